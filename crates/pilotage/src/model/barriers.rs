@@ -1,0 +1,61 @@
+//! What stops motion: the bounds of the world, and the walls of its map where there is one.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Interval, Map, Model};
+
+/// The walls of a world. The true state stops at them, and so does a belief that knows of them.
+///
+/// Without a map they are the bounds, taken one variable at a time. With one, the first two variables are stopped by its edges,
+/// blocked cells and thin walls, and the others by their bounds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Barriers {
+    bounds: Vec<Interval>,
+    map: Option<Map>,
+}
+
+impl Barriers {
+    /// The walls of a model's world.
+    pub fn new(model: &Model) -> Self {
+        Self {
+            bounds: model.state.iter().map(|variable| variable.bounds).collect(),
+            map: model.map.clone(),
+        }
+    }
+
+    /// Number of state variables.
+    pub fn states(&self) -> usize {
+        self.bounds.len()
+    }
+
+    /// Whether a map fits the number of state variables.
+    pub(crate) fn fits(&self, states: usize) -> bool {
+        self.bounds.len() == states && (self.map.is_none() || states >= 2)
+    }
+
+    /// Moves `to` back to where the straight way from `from` to it is stopped. Both have length `n`.
+    pub fn stop(&self, from: &[f64], to: &mut [f64]) {
+        let drawn = self.on_map(to, |map, to| map.travel([from[0], from[1]], to));
+        self.clamp(to, drawn);
+    }
+
+    /// Moves a point, of length `n`, to the nearest one where a state can be.
+    pub fn confine(&self, point: &mut [f64]) {
+        let drawn = self.on_map(point, Map::nearest_free);
+        self.clamp(point, drawn);
+    }
+
+    /// Replaces what the map draws; returns how many variables that are.
+    fn on_map(&self, point: &mut [f64], place: impl Fn(&Map, [f64; 2]) -> [f64; 2]) -> usize {
+        let Some(map) = &self.map else { return 0 };
+        let placed = place(map, [point[0], point[1]]);
+        point[..2].copy_from_slice(&placed);
+        2
+    }
+
+    fn clamp(&self, point: &mut [f64], first: usize) {
+        for (value, bounds) in point.iter_mut().zip(&self.bounds).skip(first) {
+            *value = bounds.clamp(*value);
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! The model file as it is written, format 1. The documentation of these tables is the documentation of the format:
+//! it goes into the JSON schema word for word.
+
+use schemars::{JsonSchema, Schema};
+use serde::Deserialize;
+
+use super::file_value::{Ends, Named, OneOrMany, Sides, Where};
+use super::{CartPole, HypothesisBelief, Then, WallBelief, Walls, When};
+
+/// Rows of numbers: `[[1.0, 0.0], [0.0, 1.0]]`.
+pub(super) type Rows = Vec<Vec<f64>>;
+
+/// JSON schema of model files, for editors and for people.
+pub fn schema() -> Schema {
+    schemars::schema_for!(ModelFile)
+}
+
+/// A planning problem: what the agent assumes about its world, what it is paid for, and what is true.
+///
+/// With n state variables, p controls and m sensor readings, the agent assumes
+/// s' = A s + B u + v, v ~ N(0, motion.noise) and o = H s + n, n ~ N(0, sensor.noise).
+/// Every noise is a covariance, never a standard deviation. Numbers are finite, except the ends of a region.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+#[schemars(title = "pilotage model file")]
+pub(super) struct ModelFile {
+    /// Version of this format: 1.
+    #[allow(dead_code, reason = "it is looked at before all other keys")]
+    pub format: u64,
+    /// Short name of the problem.
+    pub name: String,
+    /// One or two sentences about the problem.
+    #[serde(default)]
+    pub about: String,
+    /// Discount factor a step, in [0, 1). It may be 1 in a model with a `cost` and a stated `episode.length`.
+    pub discount: f64,
+    /// The state variables, their bounds and the hidden modes.
+    pub state: StateTable,
+    /// What the agent believes at the start: one Gaussian, or a list of weighted ones.
+    pub start: OneOrMany<StartTable>,
+    /// How actions move the state.
+    pub motion: MotionTable,
+    /// What the agent senses.
+    pub sensor: SensorTable,
+    /// The actions by name, at least one. Between actions that are equally good the first in the file is taken.
+    #[schemars(with = "std::collections::BTreeMap<String, ActionTable>")]
+    pub actions: Named<ActionTable>,
+    /// Rewards for taking an action in a state. All that apply are added up.
+    #[serde(default)]
+    pub reward: Vec<RewardTable>,
+    /// Changes of the hidden mode. The first that applies happens, at most one a step.
+    #[serde(default)]
+    pub event: Vec<EventTable>,
+    /// Quadratic cost of state and control.
+    pub cost: Option<CostTable>,
+    /// Length and limits of an episode.
+    #[serde(default)]
+    pub episode: EpisodeTable,
+    /// How the agent keeps its belief.
+    #[serde(default)]
+    pub belief: BeliefTable,
+    /// A drawing of walls and marked cells. The first two state variables are its x (east) and y (north).
+    pub map: Option<MapTable>,
+    /// What is true, where it differs from what the agent assumes.
+    #[serde(default)]
+    pub world: WorldTable,
+}
+
+/// The state variables.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct StateTable {
+    /// Their names, n of them, each different.
+    pub names: Vec<String>,
+    /// Lower and upper end of the world along each variable, n pairs; a hint given to the agent, and the walls of
+    /// the world if `world.walls` says so. Default: the extent of the map, or no bounds.
+    pub bounds: Option<Vec<Ends>>,
+    /// Names of the hidden modes, which no sensor shows. Default: one mode without a name.
+    #[serde(default)]
+    pub modes: Vec<String>,
+}
+
+/// One Gaussian of a start.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct StartTable {
+    /// Its probability, more than 0; all sum to 1. Default: all are equally likely.
+    pub weight: Option<f64>,
+    /// Its hidden mode. Default: the first mode.
+    pub mode: Option<String>,
+    /// Mean of the state, n numbers inside the bounds. Needed unless `uniform` is given.
+    pub mean: Option<Vec<f64>>,
+    /// Covariance of the state, n x n. Needed unless `uniform` is given.
+    pub covariance: Option<Rows>,
+    /// Instead of mean and covariance: the truth is drawn uniformly from this box, which has finite ends for every state
+    /// variable; the agent believes the Gaussian with its mean and covariance.
+    pub uniform: Option<Sides>,
+}
+
+/// Linear motion s' = A s + B u + v.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct MotionTable {
+    /// How the state moves on its own, n x n. Needed unless `linearise` is given.
+    #[serde(rename = "A")]
+    pub a: Option<Rows>,
+    /// How controls move the state, n x p. Default: the identity.
+    #[serde(rename = "B")]
+    pub b: Option<Rows>,
+    /// Covariance of v, n x n. Needed unless `linearise` is given.
+    pub noise: Option<Rows>,
+    /// Takes A and B from a plant: its linearisation about the upright pole, held for `world.cart-pole.step` seconds, and
+    /// a noise of B q B' + 1e-9 I, where q is its `force_noise`.
+    pub linearise: Option<Plant>,
+}
+
+/// Plants that can be linearised.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Plant {
+    /// The cart and pole of `world.cart-pole`: position m, velocity m/s, angle from upright rad, rad/s; one control, the
+    /// force in N.
+    CartPole,
+}
+
+/// Linear sensor o = H s + n.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct SensorTable {
+    /// What is sensed of the state, m x n. Default: all of it, the identity.
+    #[serde(rename = "H")]
+    pub h: Option<Rows>,
+    /// Covariance of n, m x m.
+    pub noise: Rows,
+}
+
+/// An action.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct ActionTable {
+    /// Control, p numbers. Default: zeros.
+    pub u: Option<Vec<f64>>,
+    /// Motion noise of this action, n x n. Default: `motion.noise`.
+    pub noise: Option<Rows>,
+    /// Sensor noise after this action, m x m. Default: `sensor.noise`.
+    pub sensor_noise: Option<Rows>,
+    /// What it does to the episode once it has been paid for. Default: the episode goes on.
+    #[serde(default)]
+    pub then: Then,
+}
+
+/// A reward, paid when the action is taken in the mode and the state is in the region.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct RewardTable {
+    /// The action or list of actions it is paid for. Default: all.
+    pub action: Option<OneOrMany<String>>,
+    /// The mode it is paid in. Default: all.
+    pub mode: Option<String>,
+    /// Where it is paid. Default: everywhere.
+    #[serde(rename = "in")]
+    pub place: Option<Where>,
+    /// Whether the state must be there before or after the move. Default: before.
+    #[serde(default)]
+    pub when: When,
+    /// Amount.
+    pub value: f64,
+}
+
+/// A change of the hidden mode, when the action is taken in the mode and the state is in the region.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct EventTable {
+    /// The action or list of actions that trigger it. Default: all.
+    pub action: Option<OneOrMany<String>>,
+    /// The mode it needs. Default: any.
+    pub mode: Option<String>,
+    /// Where it can happen. Default: everywhere.
+    #[serde(rename = "in")]
+    pub place: Option<Where>,
+    /// Whether the state must be there before or after the move; events before come first. Default: before.
+    #[serde(default)]
+    pub when: When,
+    /// The mode afterwards. Default: as before.
+    pub becomes: Option<String>,
+    /// Paid when it happens. Default: 0.
+    #[serde(default)]
+    pub reward: f64,
+    /// What it does to the episode. Default: the episode goes on.
+    #[serde(default)]
+    pub then: Then,
+}
+
+/// Quadratic cost: s' state s + u' control u a step, s' terminal s at the end of the episode.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct CostTable {
+    /// Weights of the state, n x n.
+    pub state: Rows,
+    /// Weights of the control, p x p.
+    pub control: Rows,
+    /// Weights of the final state, n x n. Default: `state`.
+    pub terminal: Option<Rows>,
+}
+
+/// When an episode is over.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct EpisodeTable {
+    /// Steps after which it stops, at least 1. Default: 100.
+    pub length: Option<u64>,
+    /// Leaving this region is a failure and ends the episode.
+    pub alive: Option<Sides>,
+    /// Paid once on failure. Default: 0.
+    pub failure_reward: Option<f64>,
+}
+
+/// How the agent keeps its belief.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct BeliefTable {
+    /// Covariances whose entries differ by less than this are one uncertainty level. Default: 5e-7.
+    pub level_tolerance: Option<f64>,
+    /// Most levels that are computed, at least 1. Default: 400.
+    pub level_limit: Option<u64>,
+    /// Whether the filter uses what walls tell it.
+    #[serde(default)]
+    pub walls: WallBelief,
+    /// How several start hypotheses are kept.
+    #[serde(default)]
+    pub hypotheses: HypothesisBelief,
+}
+
+/// A map drawn as text, in one of two forms.
+///
+/// One character a cell: `#` blocked, `.` free, a letter, digit or `*` a free cell with that mark. Or with thin walls:
+/// `+` at every corner, `-` and `|` for walls, blanks where there is none; the inside of a cell is blank, or holds one
+/// mark, or `#`. The corner of the bottom left cell is (0, 0).
+///
+/// `in = "*"` is then every cell with that mark, and `in = "#"` wherever no state can be: the blocked cells and all beyond the
+/// edges of the map.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct MapTable {
+    /// Side of a cell, more than 0, in units of state.
+    pub cell: f64,
+    /// The drawing, top row first.
+    pub rows: String,
+}
+
+/// The true world.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct WorldTable {
+    /// Which simulator it is. Default: the agent's own linear motion and sensor.
+    #[serde(default)]
+    pub kind: Kind,
+    /// What happens at `state.bounds` and at the walls of the map. Default: nothing, they are only a hint.
+    #[serde(default)]
+    pub walls: Walls,
+    /// The true start. Default: what the agent believes.
+    pub start: Option<OneOrMany<StartTable>>,
+    /// The true motion of `kind = "linear"`, where it differs from what the agent assumes.
+    pub motion: Option<WorldMotionTable>,
+    /// Parameters of the cart and pole, needed by `kind = "cart-pole"` and by `motion.linearise`.
+    #[serde(rename = "cart-pole")]
+    pub cart_pole: Option<CartPole>,
+}
+
+/// The true linear motion.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct WorldMotionTable {
+    /// True covariance of v, n x n, for every action. Default: what the agent assumes.
+    pub noise: Option<Rows>,
+    /// True controls of actions, by mode. The first that applies counts; otherwise what the agent assumes.
+    #[serde(default)]
+    pub control: Vec<ControlTable>,
+}
+
+/// What an action truly does in a mode.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct ControlTable {
+    /// The action or list of actions it applies to. Default: all.
+    pub action: Option<OneOrMany<String>>,
+    /// The mode it applies to. Default: all.
+    pub mode: Option<String>,
+    /// Control, p numbers.
+    pub u: Vec<f64>,
+}
+
+/// The simulators.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Kind {
+    /// The agent's own linear motion and sensor.
+    #[default]
+    Linear,
+    /// The nonlinear cart and pole, with the parameters of `world.cart-pole`.
+    CartPole,
+}

@@ -1,0 +1,472 @@
+//! What the agent assumes about its world: linear motion and sensing with Gaussian noise, actions,
+//! rewards, hidden modes and the events that change them.
+//!
+//! A [`Model`] is plain data, checked once when it is built ([`Model::validate`]) or read from a TOML
+//! file ([`read`]). What is *true* may differ: see [`WorldSpec`] and the `world` module.
+
+mod barriers;
+mod builtin;
+mod cart_pole;
+mod error;
+mod file;
+mod file_value;
+mod locate;
+mod map;
+mod read;
+mod region;
+mod resolve;
+mod validate;
+
+use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use barriers::Barriers;
+pub use builtin::{builtin, find, names};
+pub(crate) use error::suggest;
+pub use error::{Fault, ModelError, Path, Place, Step};
+pub use file::schema;
+pub use map::Map;
+pub use read::{load, read};
+pub use region::{Interval, Region};
+
+/// Index into [`Model::actions`].
+pub type ActionId = usize;
+/// Index into [`Model::modes`].
+pub type ModeId = usize;
+
+/// A planning problem: the agent's linear-Gaussian model, rewards and hints about the world.
+///
+/// ```text
+/// s' = A s + B u + v,   v ~ N(0, Q)        (Eq. 2.26)
+/// o  = H s + n,         n ~ N(0, R)        (Eq. 2.27)
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// Short name, also the name of the built-in problem.
+    pub name: String,
+    /// One or two sentences for people.
+    pub about: String,
+    /// Discount factor, in `[0, 1)`; 1 is allowed in a model with a [`QuadraticCost`], summed over a finite episode.
+    pub discount: f64,
+    /// Name and bounds of each state variable; bounds are the world's outer limits, a hint given to the agent.
+    pub state: Vec<StateVariable>,
+    /// Names of the hidden modes. Always at least one; a model without modes has one called `""`.
+    pub modes: Vec<String>,
+    /// What the agent believes at the start: one hypothesis in the ordinary case. Weights sum to 1.
+    pub start: Vec<StartHypothesis>,
+    /// Motion model.
+    pub motion: Motion,
+    /// Sensor model.
+    pub sensor: Sensor,
+    /// The actions, in file order. Ties between actions go to the first.
+    pub actions: Vec<Action>,
+    /// Rewards `r(s, a)`, added up over all terms that apply.
+    pub rewards: Vec<Reward>,
+    /// Events that change the hidden mode. The first that applies happens, at most one a step.
+    pub events: Vec<Event>,
+    /// Quadratic cost of state and control, for `lqg`.
+    pub cost: Option<QuadraticCost>,
+    /// Length and failure limits of an episode.
+    pub episode: Episode,
+    /// How the agent keeps its belief.
+    pub belief: BeliefSettings,
+    /// Walls and marked cells of a grid map, known to the agent's planner.
+    pub map: Option<Map>,
+    /// What is true where it differs from the above.
+    pub world: WorldSpec,
+}
+
+/// One component of the state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StateVariable {
+    /// Name used by regions and drawings.
+    pub name: String,
+    /// Outer limits of the world along this variable; infinite where there are none.
+    pub bounds: Interval,
+}
+
+/// One Gaussian component of the initial belief (Eq. 5.15).
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartHypothesis {
+    /// Prior probability; all weights sum to 1.
+    pub weight: f64,
+    /// Hidden mode under this hypothesis.
+    pub mode: ModeId,
+    /// Mean, length `n`.
+    pub mean: DVector<f64>,
+    /// Covariance, `n x n`, positive semi-definite.
+    pub covariance: DMatrix<f64>,
+    /// How the truth is drawn. The agent's filter only keeps the two moments.
+    pub shape: StartShape,
+}
+
+/// Shape of the distribution a true start is drawn from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StartShape {
+    /// N(mean, covariance).
+    #[default]
+    Normal,
+    /// Uniform in the box with that mean and covariance, which is diagonal: a side of width `w` has variance `w^2 / 12`.
+    Uniform,
+}
+
+/// Linear motion `s' = A s + B u + v` (Eq. 2.26).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// State transition, `n x n`.
+    pub a: DMatrix<f64>,
+    /// Control matrix, `n x p`.
+    pub b: DMatrix<f64>,
+    /// Process noise covariance `Q`, `n x n`, for actions that do not state their own.
+    pub noise: DMatrix<f64>,
+}
+
+/// Linear sensor `o = H s + n` (Eq. 2.27).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    /// Measurement matrix, `m x n`.
+    pub h: DMatrix<f64>,
+    /// Measurement noise covariance `R`, `m x m`, for actions that do not state their own.
+    pub noise: DMatrix<f64>,
+}
+
+/// One action the agent can take.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Action {
+    /// Name, unique in the model.
+    pub name: String,
+    /// Control `u`, length `p`.
+    pub control: DVector<f64>,
+    /// Process noise of this action, where it differs from [`Motion::noise`].
+    pub motion_noise: Option<DMatrix<f64>>,
+    /// Measurement noise after this action, where it differs from [`Sensor::noise`].
+    pub sensor_noise: Option<DMatrix<f64>>,
+    /// What happens to the episode once the action's reward is collected.
+    pub then: Then,
+}
+
+/// What an action or an event does to the episode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Then {
+    /// The episode goes on.
+    #[default]
+    Continue,
+    /// The episode ends; nothing is earned afterwards.
+    End,
+    /// World and belief start afresh from the initial belief; discounting goes on.
+    Restart,
+}
+
+/// When a step asks where the state is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum When {
+    /// When the action is taken, before the state moves: `r(s, a)`.
+    #[default]
+    Before,
+    /// Where the action has led, after the state has moved: `r(s, a, s')`.
+    After,
+}
+
+/// A reward term: paid when the action is taken in the mode, and the state is in the region.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reward {
+    /// Actions it applies to; `None` for all.
+    pub actions: Option<Vec<ActionId>>,
+    /// Mode it applies to, that in which the action is taken; `None` for all.
+    pub mode: Option<ModeId>,
+    /// Where the state must be.
+    pub region: Region,
+    /// Whether it must be there before or after the step. A step that ends or restarts the episode has no after.
+    pub when: When,
+    /// Amount, in units of reward.
+    pub value: f64,
+}
+
+/// A change of the hidden mode, with its reward.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Event {
+    /// Actions that trigger it; `None` for all.
+    pub actions: Option<Vec<ActionId>>,
+    /// Mode it needs; `None` for any.
+    pub mode: Option<ModeId>,
+    /// Where the state must be.
+    pub region: Region,
+    /// Whether it must be there before or after the step. Events before come first.
+    pub when: When,
+    /// Mode afterwards; `None` leaves it.
+    pub becomes: Option<ModeId>,
+    /// Paid when it happens.
+    pub reward: f64,
+    /// What it does to the episode.
+    pub then: Then,
+}
+
+/// `cost = s' state s + u' control u` a step, `s' terminal s` at the end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QuadraticCost {
+    /// State weights, `n x n`.
+    pub state: DMatrix<f64>,
+    /// Control weights, `p x p`.
+    pub control: DMatrix<f64>,
+    /// Final state weights, `n x n`.
+    pub terminal: DMatrix<f64>,
+}
+
+/// When an episode is over.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Episode {
+    /// Steps after which it stops, at least 1.
+    pub length: usize,
+    /// Leaving this region is a failure; the episode ends.
+    pub alive: Region,
+    /// Paid once on failure.
+    pub failure_reward: f64,
+}
+
+/// How the agent keeps its belief.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BeliefSettings {
+    /// Covariances whose entries differ by less than this are one uncertainty level (the thesis' epsilon).
+    pub level_tolerance: f64,
+    /// Most levels that are computed; a model that never converges within it is cut there, its last level steady.
+    pub level_limit: usize,
+    /// Whether the filter uses what walls tell it.
+    pub walls: WallBelief,
+    /// How several start hypotheses are kept.
+    pub hypotheses: HypothesisBelief,
+}
+
+impl Default for Episode {
+    fn default() -> Self {
+        Self {
+            length: 100,
+            alive: Region::everywhere(),
+            failure_reward: 0.0,
+        }
+    }
+}
+
+impl Default for BeliefSettings {
+    fn default() -> Self {
+        Self {
+            level_tolerance: 5e-7,
+            level_limit: 400,
+            walls: WallBelief::Ignore,
+            hypotheses: HypothesisBelief::Collapse,
+        }
+    }
+}
+
+/// What the filter makes of walls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum WallBelief {
+    /// The plain Kalman filter of the thesis: walls are not known to it.
+    #[default]
+    Ignore,
+    /// The predicted mean stops at walls as the state does, the corrected mean is kept where a state can be, and probability
+    /// beyond the bounds sits at the bounds (clipped Gaussian).
+    Clip,
+}
+
+/// How a belief made of several hypotheses is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum HypothesisBelief {
+    /// One Gaussian with the mixture's mean and covariance. Lossless when the hypotheses are points that do not
+    /// move, as in the tiger problem: their weights are then a function of level and mean.
+    #[default]
+    Collapse,
+    /// As `Collapse`, but the belief is read as the Gaussian itself and not as the hypotheses (the thesis' reading).
+    Gaussian,
+    /// Every hypothesis keeps its own filter and weight (Eq. 5.16).
+    Track,
+}
+
+/// What is true, where it differs from what the agent assumes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct WorldSpec {
+    /// Which simulator stands for the world.
+    pub kind: WorldKind,
+    /// What happens at [`StateVariable::bounds`].
+    pub walls: Walls,
+    /// True start, where it differs from the believed one.
+    pub start: Option<Vec<StartHypothesis>>,
+    /// True motion of [`WorldKind::Linear`], where it differs from the assumed one.
+    pub motion: WorldMotion,
+}
+
+/// How the true linear motion `s' = A s + B u + v` differs from the assumed one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct WorldMotion {
+    /// True process noise covariance of every action, `n x n`.
+    pub noise: Option<DMatrix<f64>>,
+    /// True controls of some actions and modes. The first that applies counts; otherwise the action's own.
+    pub controls: Vec<TrueControl>,
+}
+
+/// What an action truly does in a mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrueControl {
+    /// Actions it applies to; `None` for all.
+    pub actions: Option<Vec<ActionId>>,
+    /// Mode it applies to; `None` for all.
+    pub mode: Option<ModeId>,
+    /// Control `u`, length `p`.
+    pub control: DVector<f64>,
+}
+
+/// The simulators.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum WorldKind {
+    /// The model's own linear motion and sensor.
+    #[default]
+    Linear,
+    /// The nonlinear cart and pole of Eq. 3.6 and 3.9.
+    CartPole(CartPole),
+}
+
+/// Parameters of the cart and pole, Table 3.1. State: position m, velocity m/s, angle from upright rad, rad/s.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub struct CartPole {
+    /// Mass of the cart, kg.
+    pub cart_mass: f64,
+    /// Mass of the pole, kg.
+    pub pole_mass: f64,
+    /// Friction of the cart, N s/m.
+    pub friction: f64,
+    /// Distance from hinge to the pole's centre of mass, m.
+    pub length: f64,
+    /// Moment of inertia of the pole about its centre of mass, kg m^2.
+    pub inertia: f64,
+    /// Gravity, m/s^2.
+    pub gravity: f64,
+    /// Duration of a step, s.
+    pub step: f64,
+    /// Variance of the noise on the force, N^2.
+    pub force_noise: f64,
+}
+
+/// What happens to the true state at the bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Walls {
+    /// There are no walls: the bounds are only a hint.
+    #[default]
+    None,
+    /// The state stops at the bounds and, going straight, at the walls and blocked cells of the map.
+    Clamp,
+}
+
+impl Model {
+    /// Number of state variables, `n`.
+    pub fn state_dim(&self) -> usize {
+        self.state.len()
+    }
+
+    /// Number of sensor readings, `m`.
+    pub fn observation_dim(&self) -> usize {
+        self.sensor.h.nrows()
+    }
+
+    /// Process noise covariance of an action.
+    pub fn motion_noise(&self, action: ActionId) -> &DMatrix<f64> {
+        self.actions[action]
+            .motion_noise
+            .as_ref()
+            .unwrap_or(&self.motion.noise)
+    }
+
+    /// Measurement noise covariance after an action.
+    pub fn sensor_noise(&self, action: ActionId) -> &DMatrix<f64> {
+        self.actions[action]
+            .sensor_noise
+            .as_ref()
+            .unwrap_or(&self.sensor.noise)
+    }
+
+    /// Displacement `B u` of an action.
+    pub fn displacement(&self, action: ActionId) -> DVector<f64> {
+        &self.motion.b * &self.actions[action].control
+    }
+
+    /// A number that changes when anything a policy depends on changes; name and description do not count.
+    pub fn fingerprint(&self) -> u64 {
+        let nameless = Self {
+            name: String::new(),
+            about: String::new(),
+            ..self.clone()
+        };
+        // FNV-1a over the text of every field: any change of a number changes it, and it is the same on every machine.
+        format!("{nameless:?}")
+            .bytes()
+            .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+            })
+    }
+
+    /// The model with another belief about walls.
+    pub fn with_walls(mut self, walls: WallBelief) -> Self {
+        self.belief.walls = walls;
+        self
+    }
+
+    /// Where something good is paid: the regions of all rewards and events above 0.
+    pub fn goals(&self) -> Vec<Region> {
+        let rewards = self
+            .rewards
+            .iter()
+            .map(|reward| (reward.value, &reward.region));
+        let events = self
+            .events
+            .iter()
+            .map(|event| (event.reward, &event.region));
+        rewards
+            .chain(events)
+            .filter(|(value, _)| *value > 0.0)
+            .map(|(_, region)| region.clone())
+            .collect()
+    }
+
+    /// The action of that name.
+    pub fn action_named(&self, name: &str) -> Option<ActionId> {
+        self.actions.iter().position(|action| action.name == name)
+    }
+}
+
+impl Reward {
+    /// Whether the term is paid for this action in this mode (somewhere).
+    pub fn applies(&self, mode: ModeId, action: ActionId) -> bool {
+        applies(&self.actions, self.mode, mode, action)
+    }
+}
+
+impl Event {
+    /// Whether the event can happen on this action in this mode (somewhere).
+    pub fn applies(&self, mode: ModeId, action: ActionId) -> bool {
+        applies(&self.actions, self.mode, mode, action)
+    }
+}
+
+impl TrueControl {
+    /// Whether this is what the action does in this mode.
+    pub fn applies(&self, mode: ModeId, action: ActionId) -> bool {
+        applies(&self.actions, self.mode, mode, action)
+    }
+}
+
+fn applies(
+    actions: &Option<Vec<ActionId>>,
+    needed: Option<ModeId>,
+    mode: ModeId,
+    action: ActionId,
+) -> bool {
+    actions
+        .as_ref()
+        .is_none_or(|actions| actions.contains(&action))
+        && needed.is_none_or(|needed| needed == mode)
+}

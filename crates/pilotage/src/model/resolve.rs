@@ -1,0 +1,551 @@
+//! From the tables of a model file to a [`Model`]: names become indices, defaults are filled in.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::error::{Fault, Path};
+use super::file::{
+    ActionTable, ControlTable, EventTable, Kind, ModelFile, Plant, RewardTable, Rows, StartTable,
+    StateTable, WorldMotionTable,
+};
+use super::file_value::{Ends, OneOrMany, Sides, Where};
+use super::validate::check_names;
+use super::*;
+
+/// Builds the model and validates it; faults are placed where the file says the thing.
+pub(super) fn resolve(file: ModelFile) -> Result<Model, Fault> {
+    if file.discount == 1.0 && file.episode.length.is_none() {
+        return Err(Fault::new(
+            Path::new("discount"),
+            "a discount of 1 needs a stated length of the episode",
+            "add `length` to [episode], or give a discount below 1",
+        ));
+    }
+    let map = file
+        .map
+        .as_ref()
+        .map(|map| map::draw(&map.rows, map.cell))
+        .transpose()?;
+    let names = Names {
+        state: file.state.names.clone(),
+        modes: if file.state.modes.is_empty() {
+            vec![String::new()]
+        } else {
+            file.state.modes.clone()
+        },
+        actions: file
+            .actions
+            .0
+            .iter()
+            .map(|(name, _)| name.clone())
+            .collect(),
+        marks: map.as_ref().map(|map| map.marks.clone()),
+        solid: map.as_ref().map(Map::solid).unwrap_or_default(),
+    };
+    check_names(&names.state, &names.modes, &names.actions)?;
+    let motion = motion(&file)?;
+    let (reward_lines, rewards) = numbered(&file.reward, "reward", |table, path| {
+        names.rewards(table, path)
+    })?;
+    let (event_lines, events) = numbered(&file.event, "event", |table, path| {
+        names.events(table, path)
+    })?;
+    let controls = motion.b.ncols();
+    let model = Model {
+        state: state_variables(&file.state, map.as_ref())?,
+        start: names.start(&file.start, Path::new("start"))?,
+        sensor: Sensor {
+            h: match &file.sensor.h {
+                Some(rows) => matrix(rows, Path::new("sensor").key("H"))?,
+                None => DMatrix::identity(file.state.names.len(), file.state.names.len()),
+            },
+            noise: matrix(&file.sensor.noise, Path::new("sensor").key("noise"))?,
+        },
+        actions: file
+            .actions
+            .0
+            .iter()
+            .map(|(name, table)| action(name, table, controls))
+            .collect::<Result<_, _>>()?,
+        motion,
+        rewards,
+        events,
+        cost: cost(&file)?,
+        episode: episode(&file, &names)?,
+        belief: belief(&file),
+        map,
+        world: WorldSpec {
+            kind: world_kind(&file)?,
+            walls: file.world.walls,
+            start: match &file.world.start {
+                Some(start) => Some(names.start(start, Path::new("world").key("start"))?),
+                None => None,
+            },
+            motion: names.world_motion(&file.world.motion)?,
+        },
+        modes: names.modes,
+        name: file.name,
+        about: file.about,
+        discount: file.discount,
+    };
+    model.validate().map_err(|mut fault| {
+        fault.path.renumber("reward", &reward_lines);
+        fault.path.renumber("event", &event_lines);
+        fault
+    })?;
+    Ok(model)
+}
+
+/// The names that a file declares and its other tables refer to.
+struct Names {
+    state: Vec<String>,
+    modes: Vec<String>,
+    actions: Vec<String>,
+    /// Marked cells of the map, if there is one.
+    marks: Option<Vec<(char, Region)>>,
+    /// Where the map lets no state be.
+    solid: Vec<Region>,
+}
+
+impl Names {
+    fn mode(&self, name: &Option<String>, path: Path) -> Result<Option<ModeId>, Fault> {
+        name.as_ref()
+            .map(|name| index_of(&self.modes, "mode", name, path))
+            .transpose()
+    }
+
+    fn action_list(
+        &self,
+        list: &Option<OneOrMany<String>>,
+        path: &Path,
+    ) -> Result<Option<Vec<ActionId>>, Fault> {
+        let path = path.clone().key("action");
+        let find = |(i, name): (usize, &String)| {
+            index_of(&self.actions, "action", name, path.clone().index(i))
+        };
+        list.as_ref()
+            .map(|list| list.as_slice().iter().enumerate().map(find).collect())
+            .transpose()
+    }
+
+    fn region(&self, sides: &Sides, path: &Path) -> Result<Region, Fault> {
+        let sides = sides.iter().map(|(name, &Ends(interval))| {
+            let path = path.clone().key(name);
+            let variable =
+                index_of(&self.state, "state variable", name, path).map_err(|fault| Fault {
+                    on_key: true,
+                    ..fault
+                })?;
+            Ok((variable, interval))
+        });
+        Ok(Region::new(sides.collect::<Result<_, _>>()?))
+    }
+
+    /// The boxes that a place consists of.
+    fn regions(&self, place: &Option<Where>, path: &Path) -> Result<Vec<Region>, Fault> {
+        let path = path.clone().key("in");
+        match place {
+            None => Ok(vec![Region::everywhere()]),
+            Some(Where::Box(sides)) => Ok(vec![self.region(sides, &path)?]),
+            Some(Where::Mark(mark)) => self.marked(mark, path),
+        }
+    }
+
+    fn marked(&self, mark: &str, path: Path) -> Result<Vec<Region>, Fault> {
+        let Some(marks) = &self.marks else {
+            return Err(Fault::new(
+                path,
+                format!("`{mark}` is a mark of a map, and this model has no map"),
+                "add a [map], or give intervals such as { x = [0.0, 1.0] }",
+            ));
+        };
+        if mark == "#" {
+            return Ok(self.solid.clone());
+        }
+        let regions: Vec<Region> = marks
+            .iter()
+            .filter(|(known, _)| mark.chars().eq([*known]))
+            .map(|(_, region)| region.clone())
+            .collect();
+        if !regions.is_empty() {
+            return Ok(regions);
+        }
+        let mut known: Vec<String> = marks.iter().map(|(mark, _)| format!("`{mark}`")).collect();
+        known.sort();
+        known.dedup();
+        let drawn = if known.is_empty() {
+            "it has no marks".to_owned()
+        } else {
+            format!("its marks: {}", known.join(", "))
+        };
+        Err(Fault::new(
+            path,
+            format!("no cell of the map is marked `{mark}`"),
+            format!("mark one in the drawing; {drawn}"),
+        ))
+    }
+
+    fn rewards(&self, table: &RewardTable, path: &Path) -> Result<Vec<Reward>, Fault> {
+        let actions = self.action_list(&table.action, path)?;
+        let mode = self.mode(&table.mode, path.clone().key("mode"))?;
+        let regions = self.regions(&table.place, path)?;
+        Ok(regions
+            .into_iter()
+            .map(|region| Reward {
+                actions: actions.clone(),
+                mode,
+                region,
+                when: table.when,
+                value: table.value,
+            })
+            .collect())
+    }
+
+    fn events(&self, table: &EventTable, path: &Path) -> Result<Vec<Event>, Fault> {
+        let actions = self.action_list(&table.action, path)?;
+        let mode = self.mode(&table.mode, path.clone().key("mode"))?;
+        let becomes = self.mode(&table.becomes, path.clone().key("becomes"))?;
+        let regions = self.regions(&table.place, path)?;
+        Ok(regions
+            .into_iter()
+            .map(|region| Event {
+                actions: actions.clone(),
+                mode,
+                region,
+                when: table.when,
+                becomes,
+                reward: table.reward,
+                then: table.then,
+            })
+            .collect())
+    }
+
+    fn start(
+        &self,
+        start: &OneOrMany<StartTable>,
+        path: Path,
+    ) -> Result<Vec<StartHypothesis>, Fault> {
+        let tables = start.as_slice();
+        let equal = 1.0 / tables.len() as f64;
+        let hypothesis = |(i, table): (usize, &StartTable)| {
+            let path = path.clone().index(i);
+            let weight = table.weight.unwrap_or(equal);
+            let mode = self
+                .mode(&table.mode, path.clone().key("mode"))?
+                .unwrap_or(0);
+            self.distribution(table, weight, mode, path)
+        };
+        tables.iter().enumerate().map(hypothesis).collect()
+    }
+
+    fn distribution(
+        &self,
+        table: &StartTable,
+        weight: f64,
+        mode: ModeId,
+        path: Path,
+    ) -> Result<StartHypothesis, Fault> {
+        let missing = |key: &str| {
+            Fault::new(
+                path.clone(),
+                format!("the key `{key}` is missing"),
+                format!("add `{key}`, or `uniform = {{ x = [low, high] }}`"),
+            )
+        };
+        let Some(sides) = &table.uniform else {
+            let mean = table.mean.as_ref().ok_or_else(|| missing("mean"))?;
+            let covariance = table.covariance.as_ref();
+            let covariance = covariance.ok_or_else(|| missing("covariance"))?;
+            return Ok(StartHypothesis {
+                weight,
+                mode,
+                mean: DVector::from_column_slice(mean),
+                covariance: matrix(covariance, path.key("covariance"))?,
+                shape: StartShape::Normal,
+            });
+        };
+        for (key, given) in [
+            ("mean", table.mean.is_some()),
+            ("covariance", table.covariance.is_some()),
+        ] {
+            if given {
+                return Err(Fault::of_key(
+                    path.clone().key(key),
+                    format!("`{key}` is given, and also comes from `uniform`"),
+                    format!("delete `{key}` or `uniform`"),
+                ));
+            }
+        }
+        self.uniform(sides, weight, mode, path.key("uniform"))
+    }
+
+    fn uniform(
+        &self,
+        sides: &Sides,
+        weight: f64,
+        mode: ModeId,
+        path: Path,
+    ) -> Result<StartHypothesis, Fault> {
+        let region = self.region(sides, &path)?;
+        if let Some(name) = self.state.iter().find(|&name| !sides.contains_key(name)) {
+            return Err(Fault::new(
+                path,
+                format!("the box has no side for `{name}`"),
+                format!("add `{name} = [low, high]`"),
+            ));
+        }
+        for &(variable, side) in &region.sides {
+            if !(side.low < side.high && side.width().is_finite()) {
+                return Err(Fault::new(
+                    path.key(&self.state[variable]),
+                    format!("[{}, {}] is no box to draw from", side.low, side.high),
+                    "give two numbers, the lower first",
+                ));
+            }
+        }
+        let sides = || region.sides.iter().map(|&(_, side)| side);
+        let n = self.state.len();
+        Ok(StartHypothesis {
+            weight,
+            mode,
+            mean: DVector::from_iterator(n, sides().map(|side| 0.5 * (side.low + side.high))),
+            covariance: DMatrix::from_diagonal(&DVector::from_iterator(
+                n,
+                sides().map(|side| side.width() * side.width() / 12.0),
+            )),
+            shape: StartShape::Uniform,
+        })
+    }
+
+    fn world_motion(&self, table: &Option<WorldMotionTable>) -> Result<WorldMotion, Fault> {
+        let Some(table) = table else {
+            return Ok(WorldMotion::default());
+        };
+        let path = Path::new("world").key("motion");
+        let control = |(i, table): (usize, &ControlTable)| {
+            let path = path.clone().key("control").index(i);
+            Ok(TrueControl {
+                actions: self.action_list(&table.action, &path)?,
+                mode: self.mode(&table.mode, path.key("mode"))?,
+                control: DVector::from_column_slice(&table.u),
+            })
+        };
+        Ok(WorldMotion {
+            noise: optional_matrix(&table.noise, path.clone().key("noise"))?,
+            controls: table
+                .control
+                .iter()
+                .enumerate()
+                .map(control)
+                .collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+fn index_of(known: &[String], kind: &str, name: &str, path: Path) -> Result<usize, Fault> {
+    known
+        .iter()
+        .position(|known| known == name && !known.is_empty())
+        .ok_or_else(|| Fault::unknown(path, kind, name, known.iter().map(String::as_str)))
+}
+
+/// Resolves each table of a list, which may become several items; also returns which table each item is from.
+fn numbered<T, U>(
+    tables: &[T],
+    key: &str,
+    resolve: impl Fn(&T, &Path) -> Result<Vec<U>, Fault>,
+) -> Result<(Vec<usize>, Vec<U>), Fault> {
+    let mut lines = Vec::new();
+    let mut items = Vec::new();
+    for (i, table) in tables.iter().enumerate() {
+        let resolved = resolve(table, &Path::new(key).index(i))?;
+        lines.extend(resolved.iter().map(|_| i));
+        items.extend(resolved);
+    }
+    Ok((lines, items))
+}
+
+fn matrix(rows: &Rows, path: Path) -> Result<DMatrix<f64>, Fault> {
+    let columns = rows.first().map_or(0, Vec::len);
+    if let Some(row) = rows.iter().position(|row| row.len() != columns) {
+        return Err(Fault::new(
+            path.index(row),
+            format!(
+                "row {} has {} numbers and the first row has {columns}",
+                row + 1,
+                rows[row].len()
+            ),
+            "make all rows equally long",
+        ));
+    }
+    Ok(DMatrix::from_row_iterator(
+        rows.len(),
+        columns,
+        rows.iter().flatten().copied(),
+    ))
+}
+
+fn optional_matrix(rows: &Option<Rows>, path: Path) -> Result<Option<DMatrix<f64>>, Fault> {
+    rows.as_ref().map(|rows| matrix(rows, path)).transpose()
+}
+
+fn state_variables(table: &StateTable, map: Option<&Map>) -> Result<Vec<StateVariable>, Fault> {
+    let bounds: Vec<Interval> = match &table.bounds {
+        Some(pairs) => pairs.iter().map(|&Ends(interval)| interval).collect(),
+        None => {
+            let extent = map.map(Map::extent).into_iter().flatten();
+            extent
+                .chain(std::iter::repeat(Interval::ALL))
+                .take(table.names.len())
+                .collect()
+        }
+    };
+    if bounds.len() != table.names.len() {
+        return Err(Fault::new(
+            Path::new("state").key("bounds"),
+            format!(
+                "{} pairs of bounds for {} state variables",
+                bounds.len(),
+                table.names.len()
+            ),
+            "give one pair [low, high] for each of `names`",
+        ));
+    }
+    Ok(table
+        .names
+        .iter()
+        .cloned()
+        .zip(bounds)
+        .map(|(name, bounds)| StateVariable { name, bounds })
+        .collect())
+}
+
+fn motion(file: &ModelFile) -> Result<Motion, Fault> {
+    let (table, path) = (&file.motion, |key: &str| Path::new("motion").key(key));
+    let plant = match table.linearise {
+        Some(Plant::CartPole) => Some(
+            file.world
+                .cart_pole
+                .as_ref()
+                .ok_or_else(|| no_cart_pole(path("linearise")))?,
+        ),
+        None => None,
+    };
+    if let Some(plant) = plant {
+        for (key, rows) in [("A", &table.a), ("B", &table.b)] {
+            if rows.is_some() {
+                return Err(Fault::of_key(
+                    path(key),
+                    format!("`{key}` is given, and also comes from `linearise`"),
+                    format!("delete `{key}` or `linearise`"),
+                ));
+            }
+        }
+        plant.validate(&Path::new("world").key("cart-pole"))?;
+        let (a, b) = plant.discretised();
+        let noise =
+            optional_matrix(&table.noise, path("noise"))?.unwrap_or_else(|| plant.motion_noise());
+        return Ok(Motion { a, b, noise });
+    }
+    let needed = |key: &str, rows: &Option<Rows>| {
+        let missing = || {
+            Fault::new(
+                Path::new("motion"),
+                format!("the key `{key}` is missing"),
+                format!("add `{key}` to [motion]"),
+            )
+        };
+        optional_matrix(rows, path(key))?.ok_or_else(missing)
+    };
+    let variables = file.state.names.len();
+    Ok(Motion {
+        a: needed("A", &table.a)?,
+        b: optional_matrix(&table.b, path("B"))?
+            .unwrap_or_else(|| DMatrix::identity(variables, variables)),
+        noise: needed("noise", &table.noise)?,
+    })
+}
+
+fn no_cart_pole(path: Path) -> Fault {
+    Fault::new(
+        path,
+        "the parameters of the cart and pole are missing",
+        "add a table [world.cart-pole]",
+    )
+}
+
+fn action(name: &str, table: &ActionTable, controls: usize) -> Result<Action, Fault> {
+    let path = |key| Path::new("actions").key(name).key(key);
+    Ok(Action {
+        name: name.to_owned(),
+        control: table.u.as_ref().map_or_else(
+            || DVector::zeros(controls),
+            |u| DVector::from_column_slice(u),
+        ),
+        motion_noise: optional_matrix(&table.noise, path("noise"))?,
+        sensor_noise: optional_matrix(&table.sensor_noise, path("sensor_noise"))?,
+        then: table.then,
+    })
+}
+
+fn cost(file: &ModelFile) -> Result<Option<QuadraticCost>, Fault> {
+    let Some(table) = &file.cost else {
+        return Ok(None);
+    };
+    let path = |key| Path::new("cost").key(key);
+    let state = matrix(&table.state, path("state"))?;
+    let terminal =
+        optional_matrix(&table.terminal, path("terminal"))?.unwrap_or_else(|| state.clone());
+    Ok(Some(QuadraticCost {
+        state,
+        control: matrix(&table.control, path("control"))?,
+        terminal,
+    }))
+}
+
+fn episode(file: &ModelFile, names: &Names) -> Result<Episode, Fault> {
+    let (table, default) = (&file.episode, Episode::default());
+    let path = |key| Path::new("episode").key(key);
+    if table.failure_reward.is_some() && table.alive.is_none() {
+        return Err(Fault::of_key(
+            path("failure_reward"),
+            "a reward for failure, and nothing says what failure is",
+            "add `alive = { x = [low, high] }`: leaving it is the failure",
+        ));
+    }
+    Ok(Episode {
+        length: table.length.map_or(default.length, saturating),
+        alive: match &table.alive {
+            Some(sides) => names.region(sides, &path("alive"))?,
+            None => default.alive,
+        },
+        failure_reward: table.failure_reward.unwrap_or(default.failure_reward),
+    })
+}
+
+fn belief(file: &ModelFile) -> BeliefSettings {
+    let (table, default) = (&file.belief, BeliefSettings::default());
+    BeliefSettings {
+        level_tolerance: table.level_tolerance.unwrap_or(default.level_tolerance),
+        level_limit: table.level_limit.map_or(default.level_limit, saturating),
+        walls: table.walls,
+        hypotheses: table.hypotheses,
+    }
+}
+
+fn saturating(count: u64) -> usize {
+    usize::try_from(count).unwrap_or(usize::MAX)
+}
+
+fn world_kind(file: &ModelFile) -> Result<WorldKind, Fault> {
+    let path = Path::new("world");
+    match (file.world.kind, &file.world.cart_pole) {
+        (Kind::CartPole, Some(parameters)) => Ok(WorldKind::CartPole(parameters.clone())),
+        (Kind::CartPole, None) => Err(no_cart_pole(path.key("kind"))),
+        (Kind::Linear, Some(_)) if file.motion.linearise.is_none() => Err(Fault::of_key(
+            path.key("cart-pole"),
+            "nothing uses these parameters",
+            "add `kind = \"cart-pole\"` to [world], or delete this table",
+        )),
+        (Kind::Linear, _) => Ok(WorldKind::Linear),
+    }
+}

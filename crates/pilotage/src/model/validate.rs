@@ -1,0 +1,528 @@
+//! What every model fulfils, whether it was read from a file or built by a program.
+
+mod numbers;
+
+use nalgebra::DVector;
+
+use super::error::{Fault, Path};
+use super::*;
+use numbers::{covariance, finite, finite_matrix, positive, shape, vector};
+
+/// Weights of hypotheses may miss 1 by this much, which decimals such as 0.333333333 need.
+const WEIGHT_TOLERANCE: f64 = 1e-6;
+
+impl Model {
+    /// Checks that the model makes sense: shapes fit, covariances are covariances, numbers are finite, names are
+    /// unique, indices exist, the start is inside the world. Whether a filter converges is not asked here.
+    ///
+    /// # Errors
+    /// The first fault found, with the key of the model file that it belongs to.
+    pub fn validate(&self) -> Result<(), Fault> {
+        let variables: Vec<&str> = self
+            .state
+            .iter()
+            .map(|variable| variable.name.as_str())
+            .collect();
+        let actions: Vec<&str> = self
+            .actions
+            .iter()
+            .map(|action| action.name.as_str())
+            .collect();
+        check_names(&variables, &self.modes, &actions)?;
+        self.check_state()?;
+        self.check_discount()?;
+        self.check_motion_and_sensor()?;
+        self.check_actions()?;
+        self.check_episode()?;
+        self.check_hypotheses(&self.start, &Path::new("start"))?;
+        for (i, reward) in self.rewards.iter().enumerate() {
+            let path = Path::new("reward").index(i);
+            self.check_condition(&reward.actions, reward.mode, &reward.region, &path)?;
+            finite(reward.value, path.key("value"))?;
+        }
+        for (i, event) in self.events.iter().enumerate() {
+            let path = Path::new("event").index(i);
+            self.check_condition(&event.actions, event.mode, &event.region, &path)?;
+            self.check_mode(event.becomes, path.clone().key("becomes"))?;
+            finite(event.reward, path.key("reward"))?;
+        }
+        self.check_cost()?;
+        self.check_belief()?;
+        self.check_world()
+    }
+
+    fn check_state(&self) -> Result<(), Fault> {
+        let path = Path::new("state");
+        if self.name.trim().is_empty() {
+            return Err(Fault::new(
+                Path::new("name"),
+                "the model has no name",
+                "give a short name, such as \"corridor\"",
+            ));
+        }
+        for (i, StateVariable { bounds, .. }) in self.state.iter().enumerate() {
+            let path = path.clone().key("bounds").index(i);
+            if *bounds != Interval::ALL {
+                finite(bounds.low, path.clone().index(0))?;
+                finite(bounds.high, path.clone().index(1))?;
+            }
+            check_interval(*bounds, "the bounds", path)?;
+        }
+        if self.map.is_some() && self.state.len() < 2 {
+            return Err(Fault::new(
+                path.key("names"),
+                "a map has two directions, and there is one state variable",
+                "name two state variables, east first, then north",
+            ));
+        }
+        Ok(())
+    }
+
+    fn check_discount(&self) -> Result<(), Fault> {
+        let path = Path::new("discount");
+        finite(self.discount, path.clone())?;
+        let undiscounted = self.discount == 1.0;
+        if (0.0..1.0).contains(&self.discount) || (undiscounted && self.cost.is_some()) {
+            return Ok(());
+        }
+        let hint = if undiscounted {
+            "give a number below 1, such as 0.95; only a model with a [cost] may have 1"
+        } else {
+            "give a number from 0 up to, not including, 1, such as 0.95"
+        };
+        Err(Fault::new(
+            path,
+            format!("the discount is {}", self.discount),
+            hint,
+        ))
+    }
+
+    fn check_motion_and_sensor(&self) -> Result<(), Fault> {
+        let n = self.state_dim();
+        let (motion, sensor) = (Path::new("motion"), Path::new("sensor"));
+        let variables = format!("there are {n} state variables");
+        shape(&self.motion.a, (n, n), &variables, motion.clone().key("A"))?;
+        finite_matrix(&self.motion.a, motion.clone().key("A"))?;
+        shape(
+            &self.motion.b,
+            (n, self.motion.b.ncols().max(1)),
+            &variables,
+            motion.clone().key("B"),
+        )?;
+        finite_matrix(&self.motion.b, motion.clone().key("B"))?;
+        covariance(&self.motion.noise, n, &variables, motion.key("noise"))?;
+        let m = self.observation_dim();
+        shape(
+            &self.sensor.h,
+            (m.max(1), n),
+            &variables,
+            sensor.clone().key("H"),
+        )?;
+        finite_matrix(&self.sensor.h, sensor.clone().key("H"))?;
+        covariance(&self.sensor.noise, m, &self.readings(), sensor.key("noise"))
+    }
+
+    fn readings(&self) -> String {
+        format!(
+            "the sensor has {} readings, the rows of H",
+            self.observation_dim()
+        )
+    }
+
+    fn check_actions(&self) -> Result<(), Fault> {
+        let path = Path::new("actions");
+        for action in &self.actions {
+            let path = path.clone().key(&action.name);
+            let controls = format!(
+                "there are {} controls, the columns of B",
+                self.motion.b.ncols()
+            );
+            vector(
+                &action.control,
+                self.motion.b.ncols(),
+                &controls,
+                path.clone().key("u"),
+            )?;
+            if let Some(noise) = &action.motion_noise {
+                let variables = format!("there are {} state variables", self.state_dim());
+                covariance(
+                    noise,
+                    self.state_dim(),
+                    &variables,
+                    path.clone().key("noise"),
+                )?;
+            }
+            if let Some(noise) = &action.sensor_noise {
+                covariance(
+                    noise,
+                    self.observation_dim(),
+                    &self.readings(),
+                    path.key("sensor_noise"),
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    fn check_hypotheses(&self, start: &[StartHypothesis], path: &Path) -> Result<(), Fault> {
+        if start.is_empty() {
+            return Err(Fault::new(
+                path.clone(),
+                "the start is empty",
+                "give at least one hypothesis",
+            ));
+        }
+        for (i, hypothesis) in start.iter().enumerate() {
+            let path = path.clone().index(i);
+            let variables = format!("there are {} state variables", self.state_dim());
+            finite(hypothesis.weight, path.clone().key("weight"))?;
+            if hypothesis.weight <= 0.0 {
+                return Err(Fault::new(
+                    path.key("weight"),
+                    format!("the weight is {}", hypothesis.weight),
+                    "give a probability above 0, or delete the hypothesis",
+                ));
+            }
+            self.check_mode(Some(hypothesis.mode), path.clone().key("mode"))?;
+            vector(
+                &hypothesis.mean,
+                self.state_dim(),
+                &variables,
+                path.clone().key("mean"),
+            )?;
+            covariance(
+                &hypothesis.covariance,
+                self.state_dim(),
+                &variables,
+                path.clone().key("covariance"),
+            )?;
+            let place = match hypothesis.shape {
+                StartShape::Normal => "mean",
+                StartShape::Uniform => "uniform",
+            };
+            self.check_inside(&hypothesis.mean, &path.key(place))?;
+        }
+        let sum: f64 = start.iter().map(|hypothesis| hypothesis.weight).sum();
+        if (sum - 1.0).abs() > WEIGHT_TOLERANCE {
+            return Err(Fault::new(
+                path.clone().index(start.len() - 1).key("weight"),
+                format!("the weights of the start sum to {sum}"),
+                "make them sum to 1, or leave them out for equal weights",
+            ));
+        }
+        Ok(())
+    }
+
+    /// A start may stand on the edge of the world, but not beyond it, nor in a blocked cell.
+    fn check_inside(&self, mean: &DVector<f64>, path: &Path) -> Result<(), Fault> {
+        for (i, (&x, variable)) in mean.iter().zip(&self.state).enumerate() {
+            let Interval { low, high } = variable.bounds;
+            if !(low..=high).contains(&x) {
+                return Err(Fault::new(
+                    path.clone().index(i),
+                    format!("the start {} = {x} is outside the bounds", variable.name),
+                    format!("start between {low} and {high}, or widen `state.bounds`"),
+                ));
+            }
+        }
+        if !self.episode.alive.contains(mean.as_slice()) {
+            return Err(Fault::new(
+                path.clone(),
+                "the start is outside `episode.alive`: every episode fails at once",
+                "start inside it, or widen it",
+            ));
+        }
+        let Some(map) = &self.map else { return Ok(()) };
+        let [east, north] = map.extent();
+        if map.free([east.clamp(mean[0]), north.clamp(mean[1])]) {
+            return Ok(());
+        }
+        Err(Fault::new(
+            path.clone(),
+            "the start is inside a blocked cell of the map",
+            "start in a free cell",
+        ))
+    }
+
+    fn check_mode(&self, mode: Option<ModeId>, path: Path) -> Result<(), Fault> {
+        match mode {
+            Some(mode) if mode >= self.modes.len() => Err(Fault::new(
+                path,
+                format!("mode {mode} of {}", self.modes.len()),
+                "modes are counted from 0",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_condition(
+        &self,
+        actions: &Option<Vec<ActionId>>,
+        mode: Option<ModeId>,
+        region: &Region,
+        path: &Path,
+    ) -> Result<(), Fault> {
+        self.check_mode(mode, path.clone().key("mode"))?;
+        let too_large = |&action: &ActionId| action >= self.actions.len();
+        if let Some(action) = actions
+            .iter()
+            .flatten()
+            .copied()
+            .find(|action| too_large(action))
+        {
+            return Err(Fault::new(
+                path.clone().key("action"),
+                format!("action {action} of {}", self.actions.len()),
+                "actions are counted from 0",
+            ));
+        }
+        if actions.as_ref().is_some_and(Vec::is_empty) {
+            return Err(Fault::new(
+                path.clone().key("action"),
+                "the list of actions is empty",
+                "name an action, or delete the key for all actions",
+            ));
+        }
+        self.check_region(region, path.clone().key("in"))
+    }
+
+    fn check_region(&self, region: &Region, path: Path) -> Result<(), Fault> {
+        for &(variable, interval) in &region.sides {
+            let Some(name) = self.state.get(variable).map(|variable| &variable.name) else {
+                return Err(Fault::new(
+                    path,
+                    format!("state variable {variable} of {}", self.state_dim()),
+                    "state variables are counted from 0",
+                ));
+            };
+            check_interval(interval, "the region", path.clone().key(name))?;
+        }
+        Ok(())
+    }
+
+    fn check_cost(&self) -> Result<(), Fault> {
+        let Some(cost) = &self.cost else {
+            return Ok(());
+        };
+        let (n, p) = (self.state_dim(), self.motion.b.ncols());
+        let variables = format!("there are {n} state variables");
+        let path = |key| Path::new("cost").key(key);
+        covariance(&cost.state, n, &variables, path("state"))?;
+        covariance(
+            &cost.control,
+            p,
+            &format!("there are {p} controls, the columns of B"),
+            path("control"),
+        )?;
+        covariance(&cost.terminal, n, &variables, path("terminal"))
+    }
+
+    fn check_episode(&self) -> Result<(), Fault> {
+        let path = |key| Path::new("episode").key(key);
+        if self.episode.length == 0 {
+            return Err(Fault::new(
+                path("length"),
+                "the episode has no steps",
+                "give at least 1",
+            ));
+        }
+        finite(self.episode.failure_reward, path("failure_reward"))?;
+        self.check_region(&self.episode.alive, path("alive"))
+    }
+
+    fn check_belief(&self) -> Result<(), Fault> {
+        let path = |key| Path::new("belief").key(key);
+        finite(self.belief.level_tolerance, path("level_tolerance"))?;
+        if self.belief.level_tolerance < 0.0 {
+            return Err(Fault::new(
+                path("level_tolerance"),
+                format!("the tolerance is {}", self.belief.level_tolerance),
+                "give 0 or more, such as 5e-7",
+            ));
+        }
+        if self.belief.level_limit == 0 {
+            return Err(Fault::new(
+                path("level_limit"),
+                "no level is allowed",
+                "give at least 1",
+            ));
+        }
+        Ok(())
+    }
+
+    fn check_world(&self) -> Result<(), Fault> {
+        let path = Path::new("world");
+        if let WorldKind::CartPole(parameters) = &self.world.kind {
+            parameters.validate(&path.clone().key("cart-pole"))?;
+            if (self.state_dim(), self.motion.b.ncols()) != (4, 1) {
+                return Err(Fault::new(
+                    path.key("kind"),
+                    format!(
+                        "the cart and pole have 4 state variables and 1 control, this model {} and {}",
+                        self.state_dim(),
+                        self.motion.b.ncols()
+                    ),
+                    "name position, velocity, angle and angular velocity, in this order",
+                ));
+            }
+        }
+        let unbounded = self
+            .state
+            .iter()
+            .all(|variable| variable.bounds == Interval::ALL);
+        if self.world.walls == Walls::Clamp && unbounded {
+            return Err(Fault::new(
+                path.key("walls"),
+                "walls at the bounds, and there are no bounds",
+                "add `bounds` to [state], or delete `walls`",
+            ));
+        }
+        self.check_world_motion(&path.clone().key("motion"))?;
+        match &self.world.start {
+            Some(start) => self.check_hypotheses(start, &path.key("start")),
+            None => Ok(()),
+        }
+    }
+
+    fn check_world_motion(&self, path: &Path) -> Result<(), Fault> {
+        let motion = &self.world.motion;
+        if *motion == WorldMotion::default() {
+            return Ok(());
+        }
+        if self.world.kind != WorldKind::Linear {
+            return Err(Fault::of_key(
+                path.clone(),
+                "the simulator has its own motion",
+                "delete this table, or `kind`",
+            ));
+        }
+        if let Some(noise) = &motion.noise {
+            let variables = format!("there are {} state variables", self.state_dim());
+            covariance(
+                noise,
+                self.state_dim(),
+                &variables,
+                path.clone().key("noise"),
+            )?;
+        }
+        let controls = format!(
+            "there are {} controls, the columns of B",
+            self.motion.b.ncols()
+        );
+        for (i, entry) in motion.controls.iter().enumerate() {
+            let path = path.clone().key("control").index(i);
+            self.check_condition(&entry.actions, entry.mode, &Region::everywhere(), &path)?;
+            vector(
+                &entry.control,
+                self.motion.b.ncols(),
+                &controls,
+                path.key("u"),
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl CartPole {
+    /// Checks that the parameters are physical; `path` is where the model has them.
+    pub(super) fn validate(&self, path: &Path) -> Result<(), Fault> {
+        for (key, value) in [
+            ("cart_mass", self.cart_mass),
+            ("pole_mass", self.pole_mass),
+            ("length", self.length),
+            ("gravity", self.gravity),
+            ("step", self.step),
+        ] {
+            positive(value, false, path.clone().key(key))?;
+        }
+        for (key, value) in [
+            ("friction", self.friction),
+            ("inertia", self.inertia),
+            ("force_noise", self.force_noise),
+        ] {
+            positive(value, true, path.clone().key(key))?;
+        }
+        Ok(())
+    }
+}
+
+/// Checks that there are state variables, modes and actions, and that none of a kind share a name.
+pub(super) fn check_names<S: AsRef<str>>(
+    variables: &[S],
+    modes: &[impl AsRef<str>],
+    actions: &[S],
+) -> Result<(), Fault> {
+    let state = |key| Path::new("state").key(key);
+    if variables.is_empty() {
+        return Err(Fault::new(
+            state("names"),
+            "there is no state variable",
+            "name at least one, such as \"x\"",
+        ));
+    }
+    if modes.is_empty() {
+        return Err(Fault::new(
+            state("modes"),
+            "there is no mode",
+            "a model without modes has one called \"\"",
+        ));
+    }
+    if actions.is_empty() {
+        return Err(Fault::new(
+            Path::new("actions"),
+            "there is no action",
+            "add one, such as `STOP = { u = [0.0] }`",
+        ));
+    }
+    check_unique(variables, "state variable", |i| state("names").index(i))?;
+    if modes.len() > 1 || !modes[0].as_ref().is_empty() {
+        check_unique(modes, "mode", |i| state("modes").index(i))?;
+    }
+    check_unique(actions, "action", |i| {
+        Path::new("actions").key(actions[i].as_ref())
+    })
+}
+
+fn check_unique<S: AsRef<str>>(
+    names: &[S],
+    kind: &str,
+    path: impl Fn(usize) -> Path,
+) -> Result<(), Fault> {
+    for (i, name) in names.iter().map(AsRef::as_ref).enumerate() {
+        if name.trim().is_empty() {
+            return Err(Fault::of_key(
+                path(i),
+                format!("a {kind} without a name"),
+                "give it a name",
+            ));
+        }
+        if names[..i].iter().any(|earlier| earlier.as_ref() == name) {
+            return Err(Fault::new(
+                path(i),
+                format!("two {kind}s are called `{name}`"),
+                "rename one of them",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn check_interval(interval: Interval, what: &str, path: Path) -> Result<(), Fault> {
+    let Interval { low, high } = interval;
+    if low.is_nan() || high.is_nan() {
+        return Err(Fault::new(
+            path,
+            "an end of the interval is not a number",
+            "give numbers, `-inf` or `inf`",
+        ));
+    }
+    if low < high {
+        return Ok(());
+    }
+    let how = if low > high { "inverted" } else { "empty" };
+    Err(Fault::new(
+        path,
+        format!("{what} [{low}, {high}] is {how}"),
+        "give the lower end first, then a larger one",
+    ))
+}
