@@ -1,0 +1,255 @@
+//! The filter as it runs: a belief is a level and a mean, its update two small matrix-vector products.
+
+use serde::{Deserialize, Serialize};
+
+use super::levels::{LevelGraph, LevelId};
+use crate::model::{ActionId, Barriers, ModeId, Model, Region, WallBelief, When};
+
+/// What the agent knows: an uncertainty level, the mean at that level, and the hidden mode it takes to be the case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Belief {
+    /// Uncertainty level.
+    pub level: LevelId,
+    /// Hidden mode (or memory).
+    pub mode: ModeId,
+    /// Mean, length `n`.
+    pub mean: Vec<f64>,
+}
+
+/// A change of mode that the agent infers from its own action and belief.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Switch {
+    /// Actions it happens on; `None` for all.
+    pub actions: Option<Vec<ActionId>>,
+    /// Mode it happens in; `None` for any.
+    pub mode: Option<ModeId>,
+    /// Where the mean must be.
+    pub region: Region,
+    /// Whether it must be there when the action is taken, or once what it brought has been sensed. Changes before come first.
+    pub when: When,
+    /// Mode afterwards.
+    pub becomes: ModeId,
+}
+
+impl Switch {
+    fn happens(&self, when: When, belief: &Belief, action: ActionId) -> bool {
+        self.when == when
+            && self.mode.is_none_or(|mode| mode == belief.mode)
+            && self
+                .actions
+                .as_ref()
+                .is_none_or(|actions| actions.contains(&action))
+            && self.region.contains(&belief.mean)
+    }
+}
+
+/// Everything the update needs, in flat arrays; an update allocates nothing.
+///
+/// The mean is predicted, `m- = A m + B u`, and corrected, `m = m- + K (o - H m-)`, with the gain of the step of the level graph.
+/// Where the belief knows of walls, the prediction stops at them and the corrected mean is kept where a state can be.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Filter {
+    states: usize,
+    readings: usize,
+    /// Start level, mode and mean.
+    start: (LevelId, ModeId, Vec<f64>),
+    /// Per level and action: next level.
+    next: Vec<LevelId>,
+    /// Per level and action: `K`, column by column.
+    gains: Vec<f64>,
+    /// `A`, row by row.
+    motion: Vec<f64>,
+    /// Per action: `B u`.
+    displacements: Vec<f64>,
+    /// `H`, row by row.
+    sensor: Vec<f64>,
+    actions: usize,
+    switches: Vec<Switch>,
+    /// The walls, where the belief knows of them.
+    walls: Option<Barriers>,
+}
+
+impl Filter {
+    /// The filter of a model that starts at the given belief, with the mode changes the model's events imply.
+    pub fn new(model: &Model, levels: &LevelGraph, start: &Belief) -> Self {
+        let switches = model
+            .events
+            .iter()
+            .filter_map(|event| {
+                let becomes = event.becomes?;
+                Some(Switch {
+                    actions: event.actions.clone(),
+                    mode: event.mode,
+                    region: event.region.clone(),
+                    when: event.when,
+                    becomes,
+                })
+            })
+            .collect();
+        Self::with_switches(model, levels, start, switches)
+    }
+
+    /// As [`Filter::new`], with mode changes of the caller's.
+    pub fn with_switches(
+        model: &Model,
+        levels: &LevelGraph,
+        start: &Belief,
+        switches: Vec<Switch>,
+    ) -> Self {
+        let (states, readings, actions) = (
+            model.state_dim(),
+            model.observation_dim(),
+            model.actions.len(),
+        );
+        let mut next = Vec::with_capacity(levels.len() * actions);
+        let mut gains = Vec::with_capacity(levels.len() * actions * states * readings);
+        for level in 0..levels.len() {
+            for action in 0..actions {
+                let step = levels.step(level, levels.class_of(action));
+                next.push(step.next);
+                gains.extend(step.correction.gain.iter());
+            }
+        }
+        let displacement = |action| model.displacement(action).as_slice().to_vec();
+        Self {
+            states,
+            readings,
+            start: (start.level, start.mode, start.mean.clone()),
+            next,
+            gains,
+            motion: model.motion.a.transpose().as_slice().to_vec(),
+            displacements: (0..actions).flat_map(displacement).collect(),
+            sensor: model.sensor.h.transpose().as_slice().to_vec(),
+            actions,
+            switches,
+            walls: (model.belief.walls == WallBelief::Clip).then(|| Barriers::new(model)),
+        }
+    }
+
+    /// The same filter with another start; its level is one of the same level graph.
+    pub fn starting_at(mut self, start: &Belief) -> Self {
+        self.start = (start.level, start.mode, start.mean.clone());
+        self
+    }
+
+    /// The belief before anything was observed.
+    pub fn initial(&self) -> Belief {
+        Belief {
+            level: self.start.0,
+            mode: self.start.1,
+            mean: self.start.2.clone(),
+        }
+    }
+
+    /// Puts a belief back to the start without allocating.
+    pub fn reset(&self, belief: &mut Belief) {
+        belief.level = self.start.0;
+        belief.mode = self.start.1;
+        belief.mean.copy_from_slice(&self.start.2);
+    }
+
+    /// Whether the arrays have the sizes that go with so many levels, actions and modes, and lead to no others.
+    pub(crate) fn fits(&self, levels: usize, actions: usize, modes: usize) -> bool {
+        let edges = levels * actions;
+        let (n, m) = (self.states, self.readings);
+        // Sizes from a damaged file may be too large to multiply.
+        let holds = |values: &[f64], sizes: [usize; 3]| {
+            let size = sizes
+                .iter()
+                .try_fold(1_usize, |size, next| size.checked_mul(*next));
+            size == Some(values.len()) && values.iter().all(|value| value.is_finite())
+        };
+        self.actions == actions
+            && self.next.len() == edges
+            && self.next.iter().all(|&next| next < levels)
+            && holds(&self.gains, [edges, n, m])
+            && holds(&self.motion, [n, n, 1])
+            && holds(&self.displacements, [actions, n, 1])
+            && holds(&self.sensor, [m, n, 1])
+            && (self.start.0 < levels && self.start.1 < modes && self.start.2.len() == self.states)
+            && self.switches.iter().all(|switch| {
+                switch.becomes < modes
+                    && switch.region.sides.iter().all(|side| side.0 < self.states)
+            })
+            && self
+                .walls
+                .as_ref()
+                .is_none_or(|walls| walls.fits(self.states))
+    }
+
+    /// Number of state variables.
+    pub fn states(&self) -> usize {
+        self.states
+    }
+
+    /// Number of sensor readings.
+    pub fn readings(&self) -> usize {
+        self.readings
+    }
+
+    /// Moves the belief on by one action and the observation (length `m`) that followed. `scratch` has length `n`.
+    pub fn update(
+        &self,
+        belief: &mut Belief,
+        action: ActionId,
+        observation: &[f64],
+        scratch: &mut [f64],
+    ) {
+        let before = self.switch(When::Before, belief, action);
+        let (n, edge) = (self.states, self.edge(belief.level, action));
+        self.predict(belief, action, scratch);
+        belief.mean.copy_from_slice(scratch);
+        let size = n * self.readings;
+        let gain = &self.gains[edge * size..(edge + 1) * size];
+        for (reading, (column, &observed)) in gain.chunks_exact(n).zip(observation).enumerate() {
+            let innovation = observed - self.sensed(scratch, reading);
+            for (value, gain) in belief.mean.iter_mut().zip(column) {
+                *value += gain * innovation;
+            }
+        }
+        if let Some(walls) = &self.walls {
+            walls.confine(&mut belief.mean);
+        }
+        belief.level = self.next[edge];
+        let becomes = before.or_else(|| self.switch(When::After, belief, action));
+        belief.mode = becomes.unwrap_or(belief.mode);
+    }
+
+    /// The mode afterwards of the first change that happens.
+    fn switch(&self, when: When, belief: &Belief, action: ActionId) -> Option<ModeId> {
+        let mut switches = self.switches.iter();
+        let switch = switches.find(|switch| switch.happens(when, belief, action));
+        switch.map(|switch| switch.becomes)
+    }
+
+    /// Writes the mean expected after an action, before anything is sensed, to `predicted` (length `n`).
+    pub fn predict(&self, belief: &Belief, action: ActionId, predicted: &mut [f64]) {
+        let n = self.states;
+        let displacement = &self.displacements[action * n..(action + 1) * n];
+        for ((value, row), shift) in predicted
+            .iter_mut()
+            .zip(self.motion.chunks_exact(n))
+            .zip(displacement)
+        {
+            *value = shift + dot(row, &belief.mean);
+        }
+        if let Some(walls) = &self.walls {
+            walls.stop(&belief.mean, predicted);
+        }
+    }
+
+    /// What the sensor's reading of that number is expected to be at a state.
+    pub fn sensed(&self, state: &[f64], reading: usize) -> f64 {
+        let n = self.states;
+        dot(&self.sensor[reading * n..(reading + 1) * n], state)
+    }
+
+    /// Number of a step of the level graph: levels one after the other, each with its actions.
+    fn edge(&self, level: LevelId, action: ActionId) -> usize {
+        level * self.actions + action
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

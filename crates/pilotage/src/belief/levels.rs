@@ -1,0 +1,248 @@
+//! Uncertainty levels (thesis 4.2.3): the covariances a filter can have, known before anything is observed.
+//!
+//! With constant `A`, `H` and noise that depends on the action at most through a few classes (moving, listening, standing),
+//! the covariance does not depend on what is observed. The levels form a small graph: a node is a covariance, an edge the
+//! step of one noise class with its gain and innovation covariance.
+
+use nalgebra::DMatrix;
+
+use super::kalman::{Correction, distance};
+use super::riccati::steady_state;
+use crate::error::{Error, Result};
+use crate::model::{ActionId, Model};
+
+/// Covariances this close are the same number.
+const SAME: f64 = 1e-9;
+
+/// Index of an uncertainty level.
+pub type LevelId = usize;
+/// Index of a noise class.
+pub type ClassId = usize;
+
+/// Actions that disturb state and sensor in the same way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseClass {
+    /// Process noise covariance, `n x n`.
+    pub motion_noise: DMatrix<f64>,
+    /// Measurement noise covariance, `m x m`.
+    pub sensor_noise: DMatrix<f64>,
+}
+
+/// One step of a noise class from a level.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LevelStep {
+    /// The level it leads to.
+    pub next: LevelId,
+    /// Gain, innovation covariance and the rest of the step.
+    pub correction: Correction,
+}
+
+/// All levels that can be reached, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LevelGraph {
+    covariances: Vec<DMatrix<f64>>,
+    /// Levels at which a class has come to rest.
+    settled: Vec<bool>,
+    classes: Vec<NoiseClass>,
+    class_of_action: Vec<ClassId>,
+    /// By level, then class.
+    steps: Vec<Vec<LevelStep>>,
+    starts: Vec<LevelId>,
+    /// Whether every chain closed before the limit of levels.
+    converged: bool,
+}
+
+impl LevelGraph {
+    /// Levels reached from the start covariances by the model's actions.
+    ///
+    /// The covariance has converged when a step changes no entry by more than the model's `level_tolerance`: the level it then
+    /// reaches is the steady one and repeats itself, at the exact solution of the Riccati equation where there is one. (With
+    /// tolerance 5e-7 this is the counting rule that gives Table 4.1.) Other covariances within the tolerance of a level
+    /// already found are that level.
+    pub fn new(model: &Model, starts: &[DMatrix<f64>]) -> Self {
+        let mut graph = Self::with_classes(model);
+        let tolerance = model.belief.level_tolerance;
+        for start in starts {
+            let level = graph
+                .nearest(start, tolerance)
+                .unwrap_or_else(|| graph.add(start.clone()));
+            graph.starts.push(level);
+        }
+        let mut level = 0;
+        while level < graph.covariances.len() {
+            for class in 0..graph.classes.len() {
+                let step = graph.explore(model, level, class);
+                graph.steps[level].push(step);
+            }
+            level += 1;
+        }
+        graph
+    }
+
+    fn with_classes(model: &Model) -> Self {
+        let mut classes: Vec<NoiseClass> = Vec::new();
+        let class_of_action = (0..model.actions.len())
+            .map(|action| {
+                let class = NoiseClass {
+                    motion_noise: model.motion_noise(action).clone(),
+                    sensor_noise: model.sensor_noise(action).clone(),
+                };
+                classes
+                    .iter()
+                    .position(|known| *known == class)
+                    .unwrap_or_else(|| {
+                        classes.push(class);
+                        classes.len() - 1
+                    })
+            })
+            .collect();
+        Self {
+            covariances: Vec::new(),
+            settled: Vec::new(),
+            classes,
+            class_of_action,
+            steps: Vec::new(),
+            starts: Vec::new(),
+            converged: true,
+        }
+    }
+
+    fn explore(&mut self, model: &Model, level: LevelId, class: ClassId) -> LevelStep {
+        let NoiseClass {
+            motion_noise,
+            sensor_noise,
+        } = &self.classes[class];
+        let correction = Correction::new(
+            &model.motion.a,
+            motion_noise,
+            &model.sensor.h,
+            sensor_noise,
+            &self.covariances[level],
+        );
+        let tolerance = model.belief.level_tolerance;
+        let next = match self.nearest(&correction.covariance, tolerance) {
+            Some(found) if found == level && !self.settled[level] => {
+                self.settle(model, class, &correction.covariance)
+            }
+            Some(found) => found,
+            None if self.covariances.len() < model.belief.level_limit => {
+                self.add(correction.covariance.clone())
+            }
+            None => {
+                self.converged = false;
+                level
+            }
+        };
+        LevelStep { next, correction }
+    }
+
+    /// The steady level of a class whose covariance no longer changes by more than the tolerance.
+    fn settle(&mut self, model: &Model, class: ClassId, covariance: &DMatrix<f64>) -> LevelId {
+        let NoiseClass {
+            motion_noise,
+            sensor_noise,
+        } = &self.classes[class];
+        let steady = steady_state(&model.motion.a, motion_noise, &model.sensor.h, sensor_noise)
+            .unwrap_or_else(|_| covariance.clone());
+        let steady = self
+            .nearest(&steady, SAME)
+            .unwrap_or_else(|| self.add(steady));
+        self.settled[steady] = true;
+        steady
+    }
+
+    fn add(&mut self, covariance: DMatrix<f64>) -> LevelId {
+        self.covariances.push(covariance);
+        self.settled.push(false);
+        self.steps.push(Vec::with_capacity(self.classes.len()));
+        self.covariances.len() - 1
+    }
+
+    fn nearest(&self, covariance: &DMatrix<f64>, tolerance: f64) -> Option<LevelId> {
+        (0..self.covariances.len())
+            .map(|level| (level, distance(covariance, &self.covariances[level])))
+            .filter(|&(_, distance)| distance <= tolerance)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(level, _)| level)
+    }
+
+    /// Number of levels.
+    pub fn len(&self) -> usize {
+        self.covariances.len()
+    }
+
+    /// Never true: every model has a start.
+    pub fn is_empty(&self) -> bool {
+        self.covariances.is_empty()
+    }
+
+    /// Covariance of a level, `n x n`.
+    pub fn covariance(&self, level: LevelId) -> &DMatrix<f64> {
+        &self.covariances[level]
+    }
+
+    /// The noise classes.
+    pub fn classes(&self) -> &[NoiseClass] {
+        &self.classes
+    }
+
+    /// Noise class of an action.
+    pub fn class_of(&self, action: ActionId) -> ClassId {
+        self.class_of_action[action]
+    }
+
+    /// What one step of a class does at a level.
+    pub fn step(&self, level: LevelId, class: ClassId) -> &LevelStep {
+        &self.steps[level][class]
+    }
+
+    /// Levels of the start covariances, in the order given.
+    pub fn starts(&self) -> &[LevelId] {
+        &self.starts
+    }
+
+    /// Whether every chain of levels closed before the limit of levels.
+    pub fn converged(&self) -> bool {
+        self.converged
+    }
+
+    /// Checks that no uncertainty grows for ever. Levels that were cut at the limit while they still shrank will do.
+    ///
+    /// # Errors
+    /// [`Error::NoSteadyState`], with the direction that grows.
+    pub fn check_bounded(&self, model: &Model) -> Result<()> {
+        if self.converged {
+            return Ok(());
+        }
+        for (id, class) in self.classes.iter().enumerate() {
+            let grows = (0..self.len()).any(|level| {
+                let LevelStep { next, correction } = &self.steps[level][id];
+                *next == level && correction.covariance.trace() > self.covariances[level].trace()
+            });
+            let steady = steady_state(
+                &model.motion.a,
+                &class.motion_noise,
+                &model.sensor.h,
+                &class.sensor_noise,
+            );
+            match steady {
+                Err(error @ Error::NoSteadyState { .. }) if grows => return Err(error),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The level that repeats itself under a class, followed from a start; `None` where levels run in a circle or were cut.
+    pub fn steady(&self, start: LevelId, class: ClassId) -> Option<LevelId> {
+        let mut level = start;
+        for _ in 0..=self.len() {
+            let next = self.steps[level][class].next;
+            if next == level {
+                return self.converged.then_some(level);
+            }
+            level = next;
+        }
+        None
+    }
+}

@@ -1,0 +1,15 @@
+//! What the agent knows: Kalman filter, uncertainty levels, hypotheses, and the decision process they form.
+
+pub mod filter;
+pub mod gaussian;
+pub mod hypotheses;
+pub mod kalman;
+pub mod levels;
+pub mod mdp;
+pub mod riccati;
+
+pub use filter::{Belief, Filter, Switch};
+pub use hypotheses::{Hypothesis, Merge, Tracker, Tracking};
+pub use kalman::{Correction, KalmanFilter};
+pub use levels::{ClassId, LevelGraph, LevelId};
+pub use mdp::BeliefMdp;

@@ -1,0 +1,21 @@
+//! The one hook by which algorithms report what they do. Algorithms hold mathematics only; progress bars, logs and
+//! plots hang here.
+
+/// Watches an algorithm at work. Every method has a default that does nothing.
+pub trait Observer: Sync {
+    /// A stage of the work has come so far. `total` is 0 where it is not known.
+    fn progress(&self, stage: &'static str, done: u64, total: u64) {
+        let _ = (stage, done, total);
+    }
+
+    /// Something worth a sentence happened.
+    fn note(&self, message: &str) {
+        let _ = message;
+    }
+}
+
+/// Watches nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Silent;
+
+impl Observer for Silent {}
