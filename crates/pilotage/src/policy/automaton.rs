@@ -1,0 +1,258 @@
+//! The finite automaton (thesis 5.4): nodes at uncertainty levels, each with an action.
+
+use std::ops::RangeInclusive;
+
+use serde::{Deserialize, Serialize};
+
+use crate::belief::{Belief, BeliefMdp, Filter, LevelId};
+use crate::model::{ActionId, ModeId};
+use crate::policy::Policy;
+
+/// Index into [`Automaton::nodes`].
+pub type NodeId = usize;
+
+/// A policy as a finite automaton. Running it is: update the filter, match a node, act.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Automaton {
+    /// Name of the problem it was made for.
+    pub problem: String,
+    /// [`crate::model::Model::fingerprint`] of that problem.
+    pub fingerprint: u64,
+    /// Name of the solver that made it.
+    pub solver: String,
+    /// How a belief finds its node.
+    pub matching: Matching,
+    /// Names of the state variables.
+    pub states: Vec<String>,
+    /// Names of the actions.
+    pub actions: Vec<String>,
+    /// Names of the modes, or memories.
+    pub modes: Vec<String>,
+    /// Covariance of every level, row by row.
+    pub levels: Vec<Vec<f64>>,
+    /// Return expected from the start, where the solver knows.
+    pub planned_value: Option<f64>,
+    /// Scale of each state variable when distances are measured; 1 leaves it.
+    pub scale: Vec<f64>,
+    /// The nodes.
+    pub nodes: Vec<Node>,
+    /// The filter that keeps the belief.
+    pub filter: Filter,
+}
+
+/// How a belief finds its node among those of its level and mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Matching {
+    /// The nearest point (5.4.2).
+    Nearest,
+    /// The smallest box that holds the mean; outside all, the nearest box (5.4.1).
+    Segments,
+}
+
+/// A node of the automaton.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Node {
+    /// First and last uncertainty level it stands for.
+    pub levels: (LevelId, LevelId),
+    /// Mode, or memory, it belongs to.
+    pub mode: ModeId,
+    /// Where it is among the means of its levels.
+    pub place: Place,
+    /// What to do.
+    pub action: ActionId,
+    /// Return expected from the node, where the solver knows.
+    pub value: Option<f64>,
+    /// Mean and covariance of what was sensed on arriving, where it was visited.
+    pub observed: Option<Observed>,
+    /// Nodes it is reached from, with how often, in falling order.
+    pub predecessors: Vec<(NodeId, f64)>,
+    /// Share of all steps spent in it, in `[0, 1]`.
+    pub visits: f64,
+}
+
+/// A point or box of means.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Place {
+    /// A representative belief point, length `n`.
+    Point(Vec<f64>),
+    /// A belief segment: its corners and the point of least value in it (Figure 5.7), each of length `n`.
+    Segment {
+        /// Lower corner.
+        lower: Vec<f64>,
+        /// Point of least value.
+        minimum: Vec<f64>,
+        /// Upper corner.
+        upper: Vec<f64>,
+    },
+}
+
+/// What is sensed on arriving at a node.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Observed {
+    /// Mean, length `m`.
+    pub mean: Vec<f64>,
+    /// Covariance, row by row, `m x m`.
+    pub covariance: Vec<f64>,
+}
+
+impl Node {
+    /// A node nothing is known of yet but its place and action.
+    pub fn new(
+        levels: RangeInclusive<LevelId>,
+        mode: ModeId,
+        place: Place,
+        action: ActionId,
+        value: Option<f64>,
+    ) -> Self {
+        Self {
+            levels: levels.into_inner(),
+            mode,
+            place,
+            action,
+            value,
+            observed: None,
+            predecessors: Vec::new(),
+            visits: 0.0,
+        }
+    }
+}
+
+impl Place {
+    /// Squared distance from a mean, each variable divided by its scale; 0 inside a segment.
+    pub fn distance(&self, mean: &[f64], scale: &[f64]) -> f64 {
+        let square = |apart: f64, scale: f64| (apart / scale) * (apart / scale);
+        match self {
+            Self::Point(point) => mean
+                .iter()
+                .zip(point)
+                .zip(scale)
+                .map(|((m, x), s)| square(m - x, *s))
+                .sum(),
+            Self::Segment { lower, upper, .. } => (0..mean.len())
+                .map(|i| {
+                    square(
+                        (lower[i] - mean[i]).max(mean[i] - upper[i]).max(0.0),
+                        scale[i],
+                    )
+                })
+                .sum(),
+        }
+    }
+
+    /// Volume of a segment; 0 for a point.
+    pub fn volume(&self) -> f64 {
+        match self {
+            Self::Point(_) => 0.0,
+            Self::Segment { lower, upper, .. } => lower
+                .iter()
+                .zip(upper)
+                .map(|(low, high)| high - low)
+                .product(),
+        }
+    }
+
+    /// The point that stands for the place: itself, or the middle of a segment.
+    pub fn centre(&self) -> Vec<f64> {
+        match self {
+            Self::Point(point) => point.clone(),
+            Self::Segment { lower, upper, .. } => lower
+                .iter()
+                .zip(upper)
+                .map(|(low, high)| 0.5 * (low + high))
+                .collect(),
+        }
+    }
+}
+
+impl Automaton {
+    /// An automaton without nodes for a problem.
+    pub fn new(mdp: &BeliefMdp, solver: &str, matching: Matching) -> Self {
+        let model = mdp.model();
+        Self {
+            problem: model.name.clone(),
+            fingerprint: model.fingerprint(),
+            solver: solver.to_owned(),
+            matching,
+            states: model
+                .state
+                .iter()
+                .map(|variable| variable.name.clone())
+                .collect(),
+            actions: model
+                .actions
+                .iter()
+                .map(|action| action.name.clone())
+                .collect(),
+            modes: model.modes.clone(),
+            levels: (0..mdp.levels().len())
+                .map(|level| {
+                    mdp.levels()
+                        .covariance(level)
+                        .transpose()
+                        .as_slice()
+                        .to_vec()
+                })
+                .collect(),
+            planned_value: None,
+            scale: vec![1.0; model.state_dim()],
+            nodes: Vec::new(),
+            filter: mdp.filter(),
+        }
+    }
+
+    /// The node of a belief; `None` only without nodes.
+    pub fn matched(&self, belief: &Belief) -> Option<NodeId> {
+        self.closest(self.candidates(belief.level, belief.mode), &belief.mean)
+    }
+
+    /// Nodes among which a belief of this level and mode finds its own. A level or mode without nodes borrows those of the
+    /// nearest level in the same mode, then of any mode.
+    pub fn candidates(&self, level: LevelId, mode: ModeId) -> impl Iterator<Item = NodeId> {
+        let gap = move |node: &Node| {
+            let (first, last) = node.levels;
+            (
+                node.mode != mode,
+                first.saturating_sub(level).max(level.saturating_sub(last)),
+            )
+        };
+        let smallest = self.nodes.iter().map(gap).min();
+        (0..self.nodes.len()).filter(move |&id| Some(gap(&self.nodes[id])) == smallest)
+    }
+
+    pub(super) fn closest(
+        &self,
+        candidates: impl Iterator<Item = NodeId>,
+        mean: &[f64],
+    ) -> Option<NodeId> {
+        candidates
+            .map(|id| {
+                let place = &self.nodes[id].place;
+                (id, place.distance(mean, &self.scale), place.volume())
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)))
+            .map(|(id, _, _)| id)
+    }
+
+    /// Levels that some node stands for.
+    pub fn levels_used(&self) -> usize {
+        (0..self.levels.len())
+            .filter(|&level| {
+                self.nodes
+                    .iter()
+                    .any(|node| node.levels.0 <= level && level <= node.levels.1)
+            })
+            .count()
+    }
+}
+
+impl Policy for Automaton {
+    fn action(&self, belief: &Belief) -> ActionId {
+        self.matched(belief).map_or(0, |id| self.nodes[id].action)
+    }
+
+    fn value(&self, belief: &Belief) -> Option<f64> {
+        self.nodes[self.matched(belief)?].value
+    }
+}

@@ -1,0 +1,31 @@
+//! Policies: what to do at a belief. The one that people keep is the [`Automaton`].
+
+mod automaton;
+mod builder;
+mod controller;
+mod store;
+
+pub use automaton::{Automaton, Matching, Node, NodeId, Observed, Place};
+pub use controller::Controller;
+pub use store::write_whole;
+
+use crate::belief::Belief;
+use crate::model::ActionId;
+
+/// A rule that says what to do at every belief.
+pub trait Policy: Send + Sync {
+    /// The action at a belief.
+    fn action(&self, belief: &Belief) -> ActionId;
+
+    /// The return expected from taking an action at a belief and following the policy from then on, where it knows.
+    fn action_value(&self, belief: &Belief, action: ActionId) -> Option<f64> {
+        let _ = (belief, action);
+        None
+    }
+
+    /// The return the policy expects from a belief, where it knows.
+    fn value(&self, belief: &Belief) -> Option<f64> {
+        let _ = belief;
+        None
+    }
+}
