@@ -1,0 +1,220 @@
+//! The rules of Figure 4.5 as they are printed, made to run, for comparison.
+//!
+//! At every step the best action of the current region is compared with the action that exploration has just chosen. If they agree
+//! the region is extended to the current mean; if not, a new region of `sqrt(P) / 16` around the mean is made, whether the mean lay
+//! outside all regions (Generate) or inside one (Split). Exploration is noise, so regions are made without end, and merging, which
+//! the text promises, is not in the figure. What the figure leaves open is decided so: the smallest region that holds the mean is
+//! the current one, outside all the nearest; a new region inherits the values of the one it is made from; learning ends when the
+//! number of regions has not changed for [`CALM`] steps, or at [`Settings::printed_limit`].
+
+use super::settings::Settings;
+use super::table::boltzmann;
+use super::task::{SOLVER, Task};
+use super::{Experience, Learned, Point, RegionValue};
+use crate::model::{ActionId, Then};
+use crate::observe::Observer;
+use crate::policy::{Automaton, Matching, Node, Place};
+
+/// Steps without a new region that count as convergence.
+const CALM: u64 = 1_000;
+/// Half-width of the first region, in standard deviations of the start belief.
+const START_WIDTH: f64 = 2.5;
+
+struct Region {
+    place: Place,
+    values: Vec<f64>,
+    visits: Vec<f64>,
+}
+
+impl Region {
+    fn around(mean: &[f64], half: &[f64], values: Vec<f64>) -> Self {
+        Self {
+            place: Place::Segment {
+                lower: mean.iter().zip(half).map(|(m, h)| m - h).collect(),
+                minimum: mean.to_vec(),
+                upper: mean.iter().zip(half).map(|(m, h)| m + h).collect(),
+            },
+            visits: vec![0.0; values.len()],
+            values,
+        }
+    }
+
+    fn best(&self) -> ActionId {
+        let better = |best, action| {
+            if self.values[action] > self.values[best] {
+                action
+            } else {
+                best
+            }
+        };
+        (1..self.values.len()).fold(0, better)
+    }
+
+    /// ExtendRegion.
+    fn extend(&mut self, mean: &[f64]) {
+        if let Place::Segment { lower, upper, .. } = &mut self.place {
+            for i in 0..mean.len() {
+                lower[i] = lower[i].min(mean[i]);
+                upper[i] = upper[i].max(mean[i]);
+            }
+        }
+    }
+}
+
+/// SegmentSteadyLevel by the printed rules.
+pub(super) fn learn(task: &Task<'_>, observer: &dyn Observer) -> Learned {
+    let settings = &task.settings;
+    let mut experience = Experience::default();
+    let mut regions = vec![first_region(task)];
+    let deviations = task.deviations();
+    let half: Vec<f64> = deviations
+        .iter()
+        .map(|d| settings.printed_width * d)
+        .collect();
+    let mut temperature = settings.hot;
+    let mut curve = Vec::new();
+    let mut actor = task.actor();
+    let (step_limit, region_limit) = settings.printed_limit;
+    let (mut calm, mut reward) = (0, 0.0);
+    let over = |experience: &Experience, calm: u64, regions: &[Region]| {
+        calm >= CALM || experience.samples >= step_limit as u64 || regions.len() >= region_limit
+    };
+    while !over(&experience, calm, &regions) {
+        let (mut draws, mut exploration) = experience.next_episode(task);
+        actor.reset(&mut draws);
+        let mut previous: Option<(usize, ActionId, f64)> = None;
+        for _ in 0..task.mdp.model().episode.length {
+            if over(&experience, calm, &regions) {
+                break;
+            }
+            let mean = actor.belief.mean.clone();
+            let current = find_current_segment(&regions, &mean);
+            if let Some((before, action, reward)) = previous {
+                let next = regions[current].values[regions[current].best()];
+                let target = reward + task.discount() * next;
+                td_update(settings, &mut regions[before], action, target);
+            }
+            let heat = temperature * experience.reward_range();
+            let values = &regions[current].values;
+            let action = boltzmann(values, heat, settings.explore, &mut exploration);
+            let mut acting = current;
+            if action == regions[current].best() {
+                regions[current].extend(&mean);
+                calm += 1;
+            } else {
+                // GenerateNewRegion outside all regions, SplitRegion inside: the figure does the same in both.
+                regions.push(Region::around(&mean, &half, values.clone()));
+                acting = regions.len() - 1;
+                calm = 0;
+            }
+            let at_steady = actor.belief.level == task.steady();
+            let step = actor.step(action, &mut draws);
+            experience.collect(step.reward);
+            reward += step.reward;
+            if step.then == Then::End {
+                td_update(settings, &mut regions[acting], action, step.reward);
+                break;
+            }
+            previous = at_steady.then_some((acting, action, step.reward));
+            if experience.samples % settings.epoch as u64 == 0 {
+                temperature = (temperature * settings.cooling).max(settings.cold);
+                curve.push(point(
+                    &regions,
+                    experience.samples,
+                    reward / settings.epoch as f64,
+                ));
+                reward = 0.0;
+                observer.progress("steps", experience.samples, step_limit as u64);
+            }
+        }
+    }
+    Learned {
+        automaton: compile(task, &regions),
+        converged: calm >= CALM,
+        samples: experience.samples,
+        memory: "no memory".to_owned(),
+        curve,
+    }
+}
+
+/// The initial belief range, inside the world.
+fn first_region(task: &Task<'_>) -> Region {
+    let (start, model) = (task.mdp.start(), task.mdp.model());
+    let covariance = task.mdp.levels().covariance(start.level);
+    let half: Vec<f64> = (0..start.mean.len())
+        .map(|i| START_WIDTH * covariance[(i, i)].sqrt())
+        .collect();
+    let mut region = Region::around(&start.mean, &half, vec![0.0; task.actions()]);
+    if let Place::Segment { lower, upper, .. } = &mut region.place {
+        for (i, variable) in model.state.iter().enumerate() {
+            lower[i] = lower[i].max(variable.bounds.low);
+            upper[i] = upper[i].min(variable.bounds.high);
+        }
+    }
+    region
+}
+
+/// The smallest region around a mean, or else the nearest.
+fn find_current_segment(regions: &[Region], mean: &[f64]) -> usize {
+    let scale = vec![1.0; mean.len()];
+    let mut best = (0, f64::INFINITY, f64::INFINITY);
+    for (i, region) in regions.iter().enumerate() {
+        let (distance, volume) = (region.place.distance(mean, &scale), region.place.volume());
+        if distance < best.1 || (distance == best.1 && volume < best.2) {
+            best = (i, distance, volume);
+        }
+    }
+    best.0
+}
+
+fn td_update(settings: &Settings, region: &mut Region, action: ActionId, target: f64) {
+    region.visits[action] += 1.0;
+    let rate = (1.0 + region.visits[action])
+        .powf(-settings.rate_power)
+        .max(settings.rate_floor);
+    region.values[action] += rate * (target - region.values[action]);
+}
+
+fn corners(region: &Region) -> (Vec<f64>, Vec<f64>) {
+    match &region.place {
+        Place::Segment { lower, upper, .. } => (lower.clone(), upper.clone()),
+        Place::Point(point) => (point.clone(), point.clone()),
+    }
+}
+
+fn point(regions: &[Region], samples: u64, reward: f64) -> Point {
+    let value = |region: &Region| {
+        let (lower, upper) = corners(region);
+        RegionValue {
+            memory: 0,
+            lower,
+            upper,
+            action: region.best(),
+            value: region.values[region.best()],
+        }
+    };
+    Point {
+        memory: 0,
+        samples,
+        reward,
+        regions: regions.iter().map(value).collect(),
+    }
+}
+
+fn compile(task: &Task<'_>, regions: &[Region]) -> Automaton {
+    let mut automaton = Automaton::new(&task.mdp, SOLVER, Matching::Segments);
+    automaton.fingerprint = task.fingerprint;
+    let levels = task.chain[0]..=task.steady();
+    let node = |region: &Region| {
+        let best = region.best();
+        Node::new(
+            levels.clone(),
+            0,
+            region.place.clone(),
+            best,
+            Some(region.values[best]),
+        )
+    };
+    automaton.nodes = regions.iter().map(node).collect();
+    automaton
+}

@@ -1,0 +1,284 @@
+//! SegmentSteadyLevel (Figure 4.5): regions of the most certain level, for one memory, learned by acting.
+
+use serde::{Deserialize, Serialize};
+
+use super::Experience;
+use super::evidence::Halves;
+use super::memory::{Kind, Memory};
+use super::regions::{Region, Reviser};
+use super::table::{Table, Transition, boltzmann};
+use super::task::{Actor, Task};
+use crate::model::Then;
+use crate::random::uniform;
+
+/// Events that are written down to find their places.
+const EVENTS: usize = 20_000;
+
+/// Everything learned so far with one memory.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Steady {
+    pub memory: Memory,
+    pub table: Table,
+    /// By memory.
+    pub evidence: Vec<Halves>,
+    /// By memory.
+    pub regions: Vec<Vec<Region>>,
+    pub crossings: Crossings,
+    epoch: usize,
+    calm: usize,
+    temperature: f64,
+}
+
+/// How often each memory was left by each action for each cell, and how often an event had then happened.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Crossings {
+    actions: usize,
+    cells: usize,
+    /// By memory, action, cell.
+    arrivals: Vec<f64>,
+    pub events: Vec<Crossing>,
+}
+
+/// Events that led from a memory to another by an action, by the cell they were seen in.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Crossing {
+    pub memory: usize,
+    pub action: usize,
+    pub to: usize,
+    pub counts: Vec<f64>,
+}
+
+impl Crossings {
+    fn new(memories: usize, actions: usize, cells: usize) -> Self {
+        Self {
+            actions,
+            cells,
+            arrivals: vec![0.0; memories * actions * cells],
+            events: Vec::new(),
+        }
+    }
+
+    fn place(&self, memory: usize, action: usize, cell: usize) -> usize {
+        (memory * self.actions + action) * self.cells + cell
+    }
+
+    /// Arrivals in a cell from a memory by an action.
+    pub fn arrivals(&self, memory: usize, action: usize, cell: usize) -> f64 {
+        self.arrivals[self.place(memory, action, cell)]
+    }
+
+    fn arrive(&mut self, memory: usize, action: usize, cell: usize) {
+        let place = self.place(memory, action, cell);
+        self.arrivals[place] += 1.0;
+    }
+
+    fn event(&mut self, memory: usize, action: usize, to: usize, cell: usize) {
+        let key = (memory, action, to);
+        let of = |crossing: &Crossing| (crossing.memory, crossing.action, crossing.to);
+        let at = match self.events.binary_search_by_key(&key, of) {
+            Ok(at) => at,
+            Err(at) => {
+                let counts = vec![0.0; self.cells];
+                self.events.insert(
+                    at,
+                    Crossing {
+                        memory,
+                        action,
+                        to,
+                        counts,
+                    },
+                );
+                at
+            }
+        };
+        self.events[at].counts[cell] += 1.0;
+    }
+}
+
+/// What an epoch of learning earned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Earned {
+    pub steps: u64,
+    pub reward: f64,
+}
+
+impl Steady {
+    /// Nothing learned yet: one region for every memory, the whole world.
+    pub fn new(task: &Task<'_>, memory: Memory) -> Self {
+        let (memories, cells, actions) = (memory.len(), task.lattice.len(), task.actions());
+        let whole = Region {
+            cells: task.lattice.whole(),
+            action: 0,
+        };
+        Self {
+            table: Table::new(memories * cells, actions),
+            evidence: vec![Halves::new(cells, actions); memories],
+            regions: vec![vec![whole]; memories],
+            crossings: Crossings::new(memories, actions, cells),
+            epoch: 0,
+            calm: 0,
+            temperature: task.settings.hot,
+            memory,
+        }
+    }
+
+    /// Whether the regions no longer change.
+    pub fn converged(&self, task: &Task<'_>) -> bool {
+        self.calm >= task.settings.calm
+    }
+
+    /// Whether learning is over.
+    pub fn finished(&self, task: &Task<'_>) -> bool {
+        self.converged(task) || self.epoch >= task.settings.epoch_limit
+    }
+
+    /// Epochs so far.
+    pub fn epochs(&self) -> usize {
+        self.epoch
+    }
+
+    /// The row of the table that a memory and cell have.
+    pub fn row(&self, task: &Task<'_>, memory: usize, cell: usize) -> usize {
+        memory * task.lattice.len() + cell
+    }
+
+    /// Acts for an epoch of whole episodes, then revises the regions.
+    pub fn run_epoch(&mut self, task: &Task<'_>, experience: &mut Experience) -> Earned {
+        let settings = &task.settings;
+        let entries = self.memory.len() * task.lattice.len() * task.actions();
+        let least = settings.epoch.max(settings.epoch_per_cell * entries) as u64;
+        let mut earned = Earned {
+            steps: 0,
+            reward: 0.0,
+        };
+        let mut actor = task.actor();
+        while earned.steps < least {
+            self.run_episode(task, &mut actor, experience, &mut earned);
+        }
+        self.epoch += 1;
+        let worth = settings.worth * (1.0 - task.discount()) * self.mean_value(task);
+        let reviser = Reviser::new(&task.lattice, settings, worth);
+        let pairs = self.evidence.iter().zip(&mut self.regions);
+        let changed: f64 = pairs
+            .map(|(evidence, regions)| reviser.revise(evidence, regions))
+            .sum();
+        self.settle(task, changed);
+        earned
+    }
+
+    fn run_episode(
+        &mut self,
+        task: &Task<'_>,
+        actor: &mut Actor<'_>,
+        experience: &mut Experience,
+        earned: &mut Earned,
+    ) {
+        let (mut draws, mut exploration) = experience.next_episode(task);
+        actor.reset(&mut draws);
+        self.table.forget_traces();
+        let mut memory = 0;
+        for _ in 0..task.mdp.model().episode.length {
+            let cell = task.lattice.cell(&actor.belief.mean);
+            let row = self.row(task, memory, cell);
+            let temperature = self.temperature * experience.reward_range();
+            let explore = task.settings.explore;
+            let action = boltzmann(self.table.row(row), temperature, explore, &mut exploration);
+            let at_steady = actor.belief.level == task.steady();
+            let step = actor.step(action, &mut draws);
+            experience.collect(step.reward);
+            earned.steps += 1;
+            earned.reward += step.reward;
+            self.note_event(task, experience, step.reward, &actor.belief.mean);
+            let next_memory = match step.then {
+                Then::Restart => 0,
+                _ => self
+                    .memory
+                    .next(memory, action, step.reward, &actor.belief.mean),
+            };
+            let next_cell = task.lattice.cell(&actor.belief.mean);
+            if at_steady {
+                let next = self.row(task, next_memory, next_cell);
+                let transition = Transition {
+                    row,
+                    action,
+                    reward: step.reward,
+                    next: (step.then != Then::End).then_some(next),
+                };
+                let target = self
+                    .table
+                    .td_update(&task.settings, task.discount(), transition);
+                let coin = uniform(&mut exploration) < 0.5;
+                self.evidence[memory].add(coin, cell, action, target);
+                self.crossings.arrive(memory, action, next_cell);
+                if self.memory.is_event(step.reward) {
+                    self.crossings.event(memory, action, next_memory, next_cell);
+                }
+            }
+            memory = next_memory;
+            if step.then == Then::End {
+                break;
+            }
+        }
+    }
+
+    /// Without memory, notable rewards are written down, so that the next memory knows their places.
+    fn note_event(&self, task: &Task<'_>, experience: &mut Experience, reward: f64, mean: &[f64]) {
+        let notable = reward > 0.0 && reward >= task.settings.notable * experience.rewards.1;
+        if self.memory.kind == Kind::None && notable && experience.events.len() < EVENTS {
+            experience.events.push((reward, mean.to_vec()));
+        }
+    }
+
+    /// Lets old evidence fade, counts calm epochs and cools down. Evidence is enough once it has filled a window in every memory that
+    /// is in use.
+    fn settle(&mut self, task: &Task<'_>, changed: f64) {
+        let settings = &task.settings;
+        let window = (settings.window * task.lattice.len() * task.actions()) as f64;
+        let totals: Vec<f64> = self
+            .evidence
+            .iter()
+            .map(|evidence| evidence.all.total())
+            .collect();
+        let all: f64 = totals.iter().sum();
+        let enough = totals
+            .iter()
+            .all(|&total| total >= settings.fade * window || total < settings.rare * all);
+        for (evidence, _) in self
+            .evidence
+            .iter_mut()
+            .zip(&totals)
+            .filter(|(_, total)| **total > window)
+        {
+            evidence.fade(settings.fade);
+        }
+        if self.temperature <= settings.cold {
+            let still = enough && changed <= settings.still * all;
+            self.calm = if still { self.calm + 1 } else { 0 };
+        }
+        self.temperature = (self.temperature * settings.cooling).max(settings.cold);
+    }
+
+    /// Mean size of the best value over all visits, against which worth is measured.
+    pub fn mean_value(&self, task: &Task<'_>) -> f64 {
+        let (mut sum, mut visits) = (0.0, 0.0);
+        for (memory, evidence) in self.evidence.iter().enumerate() {
+            for cell in 0..task.lattice.len() {
+                let weight = evidence.all.visits(cell);
+                sum += weight * self.table.best(self.row(task, memory, cell)).abs();
+                visits += weight;
+            }
+        }
+        if visits > 0.0 { sum / visits } else { 0.0 }
+    }
+
+    /// Mean value of a region's action over its visits.
+    pub fn region_value(&self, task: &Task<'_>, memory: usize, region: &Region) -> f64 {
+        let (mut sum, mut visits) = (0.0, 1e-9);
+        for cell in task.lattice.cells(&region.cells) {
+            let weight = self.evidence[memory].all.visits(cell);
+            sum += weight * self.table.row(self.row(task, memory, cell))[region.action];
+            visits += weight;
+        }
+        sum / visits
+    }
+}

@@ -1,0 +1,164 @@
+//! Temporal-difference learning: action values by memory, neighbourhood and action, and the choice of actions while learning.
+
+use serde::{Deserialize, Serialize};
+
+use super::settings::Settings;
+use crate::model::ActionId;
+use crate::random::{Rng, uniform};
+
+/// Traces smaller than this have no effect worth their time.
+const FADED: f64 = 0.01;
+
+/// Values `Q(row, action)`, where a row is a memory and a neighbourhood, and the visits that set their learning rates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Table {
+    actions: usize,
+    values: Vec<f64>,
+    visits: Vec<u64>,
+    /// Eligibility of the entries visited lately in this episode.
+    #[serde(skip)]
+    traces: Vec<(usize, f64)>,
+}
+
+/// A step as the table learns from it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Transition {
+    pub row: usize,
+    pub action: ActionId,
+    pub reward: f64,
+    /// `None` where the episode ended.
+    pub next: Option<usize>,
+}
+
+impl Table {
+    pub fn new(rows: usize, actions: usize) -> Self {
+        Self {
+            actions,
+            values: vec![0.0; rows * actions],
+            visits: vec![0; rows * actions],
+            traces: Vec::new(),
+        }
+    }
+
+    /// Values of the actions in a row.
+    pub fn row(&self, row: usize) -> &[f64] {
+        &self.values[row * self.actions..(row + 1) * self.actions]
+    }
+
+    /// Value of the best action in a row.
+    pub fn best(&self, row: usize) -> f64 {
+        self.row(row)
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Forgets what led here; an episode has ended.
+    pub fn forget_traces(&mut self) {
+        self.traces.clear();
+    }
+
+    /// TD-Update: Watkins' Q(lambda) with replacing traces, which an exploring action cuts. Returns the target
+    /// `r + discount max Q(next)`.
+    pub fn td_update(&mut self, settings: &Settings, discount: f64, step: Transition) -> f64 {
+        let at = step.row * self.actions + step.action;
+        let target = step.reward + step.next.map_or(0.0, |next| discount * self.best(next));
+        let error = target - self.values[at];
+        if self.values[at] < self.best(step.row) {
+            self.traces.clear();
+        }
+        self.traces.retain(|trace| trace.0 != at);
+        self.traces.push((at, 1.0));
+        self.visits[at] += 1;
+        for (entry, trace) in &mut self.traces {
+            let rate = (1.0 + self.visits[*entry] as f64).powf(-settings.rate_power);
+            self.values[*entry] += rate.max(settings.rate_floor) * *trace * error;
+            *trace *= discount * settings.lambda;
+        }
+        self.traces.retain(|trace| trace.1 > FADED);
+        target
+    }
+}
+
+/// Boltzmann-Action-Selection at a temperature, with a share of uniform draws.
+pub(super) fn boltzmann(values: &[f64], temperature: f64, explore: f64, rng: &mut Rng) -> ActionId {
+    if uniform(rng) < explore {
+        return any_action(values.len(), rng);
+    }
+    let best = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weight = |value: &f64| ((value - best) / temperature).exp();
+    let mut draw = uniform(rng) * values.iter().map(weight).sum::<f64>();
+    let chosen = values.iter().position(|value| {
+        draw -= weight(value);
+        draw <= 0.0
+    });
+    chosen.unwrap_or(values.len() - 1)
+}
+
+/// One of so many actions, each as likely as another.
+pub(super) fn any_action(actions: usize, rng: &mut Rng) -> ActionId {
+    ((uniform(rng) * actions as f64) as usize).min(actions - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Role, stream};
+
+    fn step(row: usize, action: usize, reward: f64, next: Option<usize>) -> Transition {
+        Transition {
+            row,
+            action,
+            reward,
+            next,
+        }
+    }
+
+    #[test]
+    fn one_step_learning_moves_toward_the_target() {
+        let settings = Settings::default();
+        let mut table = Table::new(2, 2);
+        assert_eq!(table.td_update(&settings, 0.5, step(1, 0, 8.0, None)), 8.0);
+        let learned = 8.0 * 2.0_f64.powf(-0.7);
+        assert_eq!(table.row(1), [learned, 0.0]);
+        assert_eq!(
+            table.td_update(&settings, 0.5, step(0, 1, 1.0, Some(1))),
+            1.0 + 0.5 * learned
+        );
+        assert_eq!(
+            table.row(1),
+            [learned, 0.0],
+            "without lambda only the visited entry moves"
+        );
+    }
+
+    #[test]
+    fn traces_carry_an_error_back_until_an_exploring_action_cuts_them() {
+        let settings = Settings {
+            lambda: 1.0,
+            ..Settings::default()
+        };
+        let mut table = Table::new(3, 2);
+        table.td_update(&settings, 0.5, step(0, 0, 0.0, Some(1)));
+        table.td_update(&settings, 0.5, step(1, 0, 8.0, Some(2)));
+        let rate = 2.0_f64.powf(-0.7);
+        assert!((table.row(1)[0] - 8.0 * rate).abs() < 1e-12);
+        assert!((table.row(0)[0] - 0.5 * 8.0 * rate).abs() < 1e-12);
+        let before = table.row(0)[0];
+        table.td_update(&settings, 0.5, step(1, 1, 100.0, None));
+        assert_eq!(table.row(0)[0], before);
+    }
+
+    #[test]
+    fn boltzmann_odds_are_exponential_in_value() {
+        let mut rng = stream(3, 0, Role::Exploration);
+        let draws = 20_000;
+        let first = (0..draws)
+            .filter(|_| boltzmann(&[1.0, 0.0], 1.0, 0.0, &mut rng) == 0)
+            .count();
+        let expected = 1.0 / (1.0 + (-1.0_f64).exp());
+        let error = (expected * (1.0 - expected) / draws as f64).sqrt();
+        // Fails for a right sampler with probability 6e-5, but the seed is fixed.
+        assert!((first as f64 / draws as f64 - expected).abs() < 4.0 * error);
+    }
+}

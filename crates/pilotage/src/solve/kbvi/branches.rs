@@ -1,0 +1,383 @@
+//! The horizon-N Q-value (thesis 5.3): depth-first search for the best sequence of actions.
+//!
+//! A branch of the tree is a sequence of actions fixed in advance. Its worth is the discounted sum of expected rewards over the
+//! beliefs that may be held at each step. Branches are cut where the mean leaves the world (the thesis' pruning), where even the
+//! largest reward at every later step could not make up for what is missing (branch and bound), and where the same expected belief
+//! was reached before with more in hand.
+
+use std::collections::HashMap;
+
+use nalgebra::DVector;
+
+use super::formulas::{Formulas, Outlook};
+use crate::belief::{Belief, BeliefMdp, ClassId};
+use crate::model::{ActionId, ModeId, Then};
+use crate::policy::Policy;
+
+/// Settings of the search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Steps the agent looks ahead: a branch collects the rewards of steps 0 to `horizon`.
+    pub horizon: usize,
+    /// Steps for which an action is kept once chosen ("logically grouped actions"), at least 1.
+    pub group: usize,
+    /// The formulas.
+    pub formulas: Formulas,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            horizon: 12,
+            group: 1,
+            formulas: Formulas::default(),
+        }
+    }
+}
+
+/// How far outside the bounds an expected mean may be, in standard deviations of the level.
+const REACH: f64 = 2.5;
+
+/// The planner that searches the tree anew at every belief.
+#[derive(Debug, Clone)]
+pub struct Branches {
+    mdp: BeliefMdp,
+    settings: Settings,
+}
+
+impl Branches {
+    /// A planner for the decision process.
+    pub fn new(mdp: BeliefMdp, settings: Settings) -> Self {
+        Self { mdp, settings }
+    }
+
+    /// The same planner with another horizon.
+    pub fn with_horizon(&self, horizon: usize) -> Self {
+        Self {
+            mdp: self.mdp.clone(),
+            settings: Settings {
+                horizon,
+                ..self.settings
+            },
+        }
+    }
+
+    /// Steps it looks ahead.
+    pub fn horizon(&self) -> usize {
+        self.settings.horizon
+    }
+
+    /// The decision process.
+    pub fn mdp(&self) -> &BeliefMdp {
+        &self.mdp
+    }
+
+    /// `Q` of every action as the first of a branch.
+    ///
+    /// Where observations gather around the true state and not around the mean (the tiger), the branch is searched once for each
+    /// case, as the thesis does, and the cases are weighted by the belief.
+    pub fn q_values(&self, belief: &Belief) -> Vec<f64> {
+        let cases = match self.mdp.hypotheses(belief.level, &belief.mean) {
+            Some(points) => points
+                .into_iter()
+                .map(|(weight, point)| (weight, Some(point)))
+                .collect(),
+            None => vec![(1.0, None)],
+        };
+        let mut q = vec![0.0; self.mdp.model().actions.len()];
+        for (weight, case) in cases {
+            let mut search = Search::new(&self.mdp, &self.settings, case);
+            for (action, q) in q.iter_mut().enumerate() {
+                *q += weight * search.best_branch_from(belief, action);
+            }
+        }
+        q
+    }
+}
+
+impl Policy for Branches {
+    fn action(&self, belief: &Belief) -> ActionId {
+        first_best(&self.q_values(belief))
+    }
+
+    fn value(&self, belief: &Belief) -> Option<f64> {
+        self.q_values(belief).into_iter().reduce(f64::max)
+    }
+}
+
+/// Index of the largest value; of values equal but for rounding, the first.
+pub(crate) fn first_best(values: &[f64]) -> usize {
+    let mut best = 0;
+    for (index, &value) in values.iter().enumerate() {
+        if value > values[best] + 1e-12 * values[best].abs().max(1.0) {
+            best = index;
+        }
+    }
+    best
+}
+
+/// Index of an outlook in [`Search::outlooks`].
+type OutlookId = usize;
+
+/// An expected belief in the tree.
+#[derive(Debug, Clone)]
+struct Expected {
+    mode: ModeId,
+    outlook: OutlookId,
+    mean: DVector<f64>,
+}
+
+struct Search<'a> {
+    mdp: &'a BeliefMdp,
+    settings: &'a Settings,
+    /// The true state, where the case fixes it.
+    case: Option<&'a DVector<f64>>,
+    displacements: Vec<DVector<f64>>,
+    /// `discount^t`, and the least and the most that steps `t..=horizon` can earn, by `t`.
+    weights: Vec<f64>,
+    bounds: Vec<(f64, f64)>,
+    /// Outlooks met so far, and where each noise class leads from them.
+    outlooks: Vec<Outlook>,
+    leads_to: HashMap<(OutlookId, ClassId), OutlookId>,
+    /// Actions by mode: the first action that earns the same rewards everywhere.
+    earns_like: Vec<Vec<ActionId>>,
+    /// The best whole branch so far.
+    best: f64,
+    /// The most that was in hand when an expected belief was reached.
+    reached: HashMap<(usize, ModeId, OutlookId, Vec<i64>), f64>,
+}
+
+impl<'a> Search<'a> {
+    fn new(mdp: &'a BeliefMdp, settings: &'a Settings, case: Option<&'a DVector<f64>>) -> Self {
+        let model = mdp.model();
+        let (smallest, largest) = mdp.reward_range();
+        let weights: Vec<f64> = (0..=settings.horizon as i32)
+            .map(|t| model.discount.powi(t))
+            .collect();
+        let mut bounds = vec![(0.0, 0.0); weights.len() + 1];
+        for t in (0..weights.len()).rev() {
+            let (least, most) = bounds[t + 1];
+            bounds[t] = (least + weights[t] * smallest, most + weights[t] * largest);
+        }
+        let actions = 0..model.actions.len();
+        let pays = |mode: ModeId, action: ActionId| -> Vec<bool> {
+            let rewards = model
+                .rewards
+                .iter()
+                .map(|reward| reward.applies(mode, action));
+            rewards
+                .chain(model.events.iter().map(|event| event.applies(mode, action)))
+                .collect()
+        };
+        let first_alike = |mode, action| {
+            actions
+                .clone()
+                .find(|&other| pays(mode, other) == pays(mode, action))
+                .unwrap_or(action)
+        };
+        Self {
+            mdp,
+            settings,
+            case,
+            displacements: actions
+                .clone()
+                .map(|action| model.displacement(action))
+                .collect(),
+            weights,
+            bounds,
+            outlooks: Vec::new(),
+            leads_to: HashMap::new(),
+            earns_like: (0..model.modes.len())
+                .map(|mode| {
+                    actions
+                        .clone()
+                        .map(|action| first_alike(mode, action))
+                        .collect()
+                })
+                .collect(),
+            best: f64::NEG_INFINITY,
+            reached: HashMap::new(),
+        }
+    }
+
+    /// What the best branch that begins with the action collects.
+    fn best_branch_from(&mut self, belief: &Belief, action: ActionId) -> f64 {
+        self.best = f64::NEG_INFINITY;
+        self.reached.clear();
+        let root = self.root(belief);
+        let reward = self.reward(&root, action);
+        self.take(&root, action, reward, 0, 0.0);
+        self.best
+    }
+
+    fn root(&mut self, belief: &Belief) -> Expected {
+        let certain = Outlook::certain(self.mdp, belief.level);
+        let outlook = self
+            .outlooks
+            .iter()
+            .position(|known| *known == certain)
+            .unwrap_or_else(|| {
+                self.outlooks.push(certain);
+                self.outlooks.len() - 1
+            });
+        Expected {
+            mode: belief.mode,
+            outlook,
+            mean: DVector::from_column_slice(&belief.mean),
+        }
+    }
+
+    fn reward(&self, at: &Expected, action: ActionId) -> f64 {
+        self.settings.formulas.reward(
+            self.mdp,
+            at.mode,
+            &self.outlooks[at.outlook],
+            &at.mean,
+            action,
+        )
+    }
+
+    /// Takes an action, whose reward here is known, for one group of steps from step `time`, with `in_hand` collected before.
+    fn take(&mut self, from: &Expected, action: ActionId, reward: f64, time: usize, in_hand: f64) {
+        let mut at = from.clone();
+        let mut in_hand = in_hand + self.weights[time] * reward;
+        let end = (time + self.settings.group).min(self.settings.horizon + 1);
+        for t in time..end {
+            if t > time {
+                in_hand += self.weights[t] * self.reward(&at, action);
+            }
+            match self.advance(&mut at, action) {
+                Then::Continue if self.fails(&at) => {
+                    let paid = self.mdp.model().episode.failure_reward;
+                    return self.finish(in_hand + self.weights[t] * paid);
+                }
+                Then::Continue => {}
+                Then::End => return self.finish(in_hand),
+                Then::Restart => at = self.root(self.mdp.start()),
+            }
+        }
+        if end > self.settings.horizon {
+            return self.finish(in_hand);
+        }
+        self.descend(&at, end, in_hand);
+    }
+
+    fn descend(&mut self, at: &Expected, time: usize, in_hand: f64) {
+        let (least, most) = self.bounds[time];
+        if in_hand + most <= self.best || self.was_reached_with_more(at, time, in_hand) {
+            return;
+        }
+        if !self.within_reach(at) {
+            // Not worth a look, and no way out of costs: it counts for the least it can earn.
+            return self.finish(in_hand + least);
+        }
+        let mut promising: Vec<(f64, ActionId)> = Vec::with_capacity(self.displacements.len());
+        for action in 0..self.displacements.len() {
+            let alike = self.earns_like[at.mode][action];
+            let reward = if alike < action {
+                promising[alike].0
+            } else {
+                self.reward(at, action)
+            };
+            promising.push((reward, action));
+        }
+        promising.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (reward, action) in promising {
+            self.take(at, action, reward, time, in_hand);
+        }
+    }
+
+    fn finish(&mut self, collected: f64) {
+        self.best = self.best.max(collected);
+    }
+
+    /// Moves the expected belief on by one step (Eq. 5.3 and 5.5); the mode follows the event that the expected mean calls for.
+    fn advance(&mut self, at: &mut Expected, action: ActionId) -> Then {
+        let model = self.mdp.model();
+        let event = model.events.iter().find(|event| {
+            event.applies(at.mode, action) && event.region.contains(at.mean.as_slice())
+        });
+        let mode = event.and_then(|event| event.becomes).unwrap_or(at.mode);
+        let then = match model.actions[action].then {
+            Then::Continue => event.map_or(Then::Continue, |event| event.then),
+            ends => ends,
+        };
+        if then != Then::Continue {
+            return then;
+        }
+        let class = self.mdp.levels().class_of(action);
+        let moved = &model.motion.a * &at.mean + &self.displacements[action];
+        let mut mean = self.mdp.stop(at.mean.as_slice(), moved);
+        if let Some(point) = self.case {
+            let step = self
+                .mdp
+                .levels()
+                .step(self.outlooks[at.outlook].level, class);
+            mean += &step.correction.gain * (&model.sensor.h * (point - &mean));
+        }
+        *at = Expected {
+            mode,
+            outlook: self.next_outlook(at.outlook, class),
+            mean: self.mdp.confine(mean),
+        };
+        then
+    }
+
+    fn next_outlook(&mut self, from: OutlookId, class: ClassId) -> OutlookId {
+        if let Some(&known) = self.leads_to.get(&(from, class)) {
+            return known;
+        }
+        let next = self.settings.formulas.next_outlook(
+            self.mdp,
+            &self.outlooks[from],
+            class,
+            self.case.is_some(),
+        );
+        let id = self
+            .outlooks
+            .iter()
+            .position(|known| *known == next)
+            .unwrap_or_else(|| {
+                self.outlooks.push(next);
+                self.outlooks.len() - 1
+            });
+        self.leads_to.insert((from, class), id);
+        id
+    }
+
+    fn was_reached_with_more(&mut self, at: &Expected, time: usize, in_hand: f64) -> bool {
+        // Sums of the same displacements in another order differ in the last digits.
+        let mean = at
+            .mean
+            .iter()
+            .map(|value| (value * 1e9).round() as i64)
+            .collect();
+        let known = self
+            .reached
+            .entry((time, at.mode, at.outlook, mean))
+            .or_insert(f64::NEG_INFINITY);
+        let more = *known >= in_hand;
+        *known = known.max(in_hand);
+        more
+    }
+
+    /// Whether the expected mean is where the agent fails: a branch is over there.
+    fn fails(&self, at: &Expected) -> bool {
+        !self.mdp.model().episode.alive.contains(at.mean.as_slice())
+    }
+
+    /// Whether the expected mean is inside the bounds, extended by 2.5 standard deviations of the level (Figure 5.5).
+    fn within_reach(&self, at: &Expected) -> bool {
+        let model = self.mdp.model();
+        let covariance = self
+            .mdp
+            .levels()
+            .covariance(self.outlooks[at.outlook].level);
+        let inside = |i: usize| {
+            let margin = REACH * covariance[(i, i)].sqrt();
+            let bounds = model.state[i].bounds;
+            bounds.low - margin <= at.mean[i] && at.mean[i] <= bounds.high + margin
+        };
+        (0..at.mean.len()).all(inside)
+    }
+}

@@ -1,0 +1,394 @@
+//! The underlying decision process: the same model for an agent that is told the true state and mode.
+//!
+//! ```text
+//! Q(s, a) = r(s, a) + F(s, a),   F(s, a) = discount * E V(A s + B u + v),   V(s) = max_a Q(s, a)
+//! ```
+//!
+//! It is solved by value iteration on a grid of true states; where the start hypotheses are points that do not move, they are all
+//! the states there are. What leaves [`crate::model::Episode::alive`] is worth the failure's reward and nothing after it.
+
+use nalgebra::DVector;
+
+use super::grid::{Axis, Grid, Interpolation, Smoother};
+use super::kbvi::branches::first_best;
+use crate::belief::BeliefMdp;
+use crate::error::{Error, Result};
+use crate::model::{ActionId, HypothesisBelief, ModeId, Model, Then, WallBelief};
+use crate::observe::Observer;
+use crate::parallel;
+
+/// Settings of value iteration on true states.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Points of the grid along each variable, at least 2; `None` for the default of the number of variables.
+    pub points: Option<usize>,
+    /// Largest error of the fixed point, in units of reward, above 0.
+    pub tolerance: f64,
+    /// Most sweeps, at least 1.
+    pub sweeps: usize,
+    /// Most memory for the grid, MiB.
+    pub memory: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            points: None,
+            tolerance: 1e-6,
+            sweeps: 20_000,
+            memory: 1024,
+        }
+    }
+}
+
+/// Most state variables for which a grid of true states is fine enough to be of use.
+pub const MOST_VARIABLES: usize = 3;
+
+/// A solved decision process of true states.
+#[derive(Debug)]
+pub struct StateMdp {
+    belief_mdp: BeliefMdp,
+    space: Space,
+    /// `V`, by mode, then state.
+    values: Vec<Vec<f64>>,
+    /// `F`, by mode and action, then state.
+    future: Vec<Vec<f64>>,
+    /// Whether the tolerance was reached within the allowed sweeps.
+    pub converged: bool,
+}
+
+/// The true states.
+#[derive(Debug, Clone)]
+pub enum Space {
+    /// Points of a grid; values between them are interpolated.
+    Grid(Grid),
+    /// The start hypotheses, which do not move.
+    Points(Vec<DVector<f64>>),
+}
+
+impl Space {
+    fn len(&self) -> usize {
+        match self {
+            Self::Grid(grid) => grid.len(),
+            Self::Points(points) => points.len(),
+        }
+    }
+
+    fn state(&self, index: usize) -> Vec<f64> {
+        match self {
+            Self::Grid(grid) => grid.point(index),
+            Self::Points(points) => points[index].as_slice().to_vec(),
+        }
+    }
+}
+
+/// What an action leads to from a state.
+#[derive(Debug)]
+enum Next {
+    /// The episode goes on in a mode, around a place (on the grid).
+    Continue { mode: ModeId, centre: Vec<f64> },
+    /// It starts anew.
+    Restart,
+    /// It is over.
+    End,
+}
+
+/// One action in one state.
+#[derive(Debug)]
+struct Entry {
+    reward: f64,
+    next: Next,
+}
+
+impl StateMdp {
+    /// Solves the decision process of true states that underlies a belief decision process.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] where the grid does not fit the memory allowed, [`Error::Setting`] for settings out of range.
+    pub fn solve(
+        belief_mdp: &BeliefMdp,
+        settings: &Settings,
+        observer: &dyn Observer,
+    ) -> Result<Self> {
+        check(settings)?;
+        let space = space(belief_mdp, settings)?;
+        let (modes, actions) = (
+            belief_mdp.model().modes.len(),
+            belief_mdp.model().actions.len(),
+        );
+        let mut mdp = Self {
+            values: vec![vec![0.0; space.len()]; modes],
+            future: vec![vec![0.0; space.len()]; modes * actions],
+            belief_mdp: belief_mdp.clone(),
+            space,
+            converged: false,
+        };
+        let entries: Vec<Vec<Entry>> = (0..modes * actions)
+            .map(|index| {
+                parallel::map(mdp.space.len(), |state| {
+                    mdp.entry(index / actions, &mdp.space.state(state), index % actions)
+                })
+            })
+            .collect();
+        let smoothers = mdp.smoothers();
+        let discount = mdp.model().discount;
+        let target = settings.tolerance * (1.0 - discount) / discount.max(1e-9);
+        for sweep in 0..settings.sweeps {
+            let change = mdp.sweep(&entries, &smoothers);
+            observer.progress("sweeps", sweep as u64 + 1, 0);
+            if change <= target {
+                mdp.converged = true;
+                break;
+            }
+        }
+        Ok(mdp)
+    }
+
+    fn model(&self) -> &Model {
+        self.belief_mdp.model()
+    }
+
+    /// The belief decision process above it.
+    pub fn belief_mdp(&self) -> &BeliefMdp {
+        &self.belief_mdp
+    }
+
+    /// The true states.
+    pub fn space(&self) -> &Space {
+        &self.space
+    }
+
+    /// `F(., a)` in a mode, by state: what an action brings beyond its immediate reward.
+    pub fn future(&self, mode: ModeId, action: ActionId) -> &[f64] {
+        &self.future[mode * self.model().actions.len() + action]
+    }
+
+    /// `Q(s, a)` of every action in a true state of length `n`; where the states are points, in the nearest of them.
+    pub fn q_values(&self, mode: ModeId, state: &[f64]) -> Vec<f64> {
+        let nearest = |points: &[DVector<f64>]| {
+            let distance = |x: &DVector<f64>| (x - DVector::from_column_slice(state)).norm();
+            (0..points.len()).fold(0, |best, i| {
+                if distance(&points[i]) < distance(&points[best]) {
+                    i
+                } else {
+                    best
+                }
+            })
+        };
+        let future = |action| match &self.space {
+            Space::Grid(grid) => grid.interpolate(self.future(mode, action), state),
+            Space::Points(points) => self.future(mode, action)[nearest(points)],
+        };
+        (0..self.model().actions.len())
+            .map(|action| reward(self.model(), mode, state, action) + future(action))
+            .collect()
+    }
+
+    /// The best action in a true state, ties to the first.
+    pub fn action(&self, mode: ModeId, state: &[f64]) -> ActionId {
+        first_best(&self.q_values(mode, state))
+    }
+
+    fn entry(&self, mode: ModeId, state: &[f64], action: ActionId) -> Entry {
+        let model = self.model();
+        let event = model
+            .events
+            .iter()
+            .find(|event| event.applies(mode, action) && event.region.contains(state));
+        let then = match (model.actions[action].then, event) {
+            (Then::Continue, Some(event)) => event.then,
+            (then, _) => then,
+        };
+        let next = match then {
+            Then::End => Next::End,
+            Then::Restart => Next::Restart,
+            Then::Continue => {
+                let centre = &model.motion.a * DVector::from_column_slice(state)
+                    + model.displacement(action);
+                Next::Continue {
+                    mode: event.and_then(|event| event.becomes).unwrap_or(mode),
+                    centre: self.belief_mdp.stop(state, centre).as_slice().to_vec(),
+                }
+            }
+        };
+        Entry {
+            reward: reward(model, mode, state, action),
+            next,
+        }
+    }
+
+    /// Averages over the motion noise of each class; none where the states are points.
+    fn smoothers(&self) -> Vec<Option<Smoother>> {
+        let classes = self.belief_mdp.levels().classes().iter();
+        classes
+            .map(|class| match &self.space {
+                Space::Grid(grid) => Some(grid.smoother(&class.motion_noise)),
+                Space::Points(_) => None,
+            })
+            .collect()
+    }
+
+    /// One sweep of value iteration; returns the largest change of `V`.
+    fn sweep(&mut self, entries: &[Vec<Entry>], smoothers: &[Option<Smoother>]) -> f64 {
+        let (modes, actions) = (self.values.len(), self.model().actions.len());
+        let restart = self.discounted_start();
+        let worth: Vec<Vec<f64>> = (0..modes).map(|mode| self.worth(mode)).collect();
+        let expected = parallel::map(modes * smoothers.len(), |index| {
+            let worth = &worth[index / smoothers.len()];
+            match (&self.space, &smoothers[index % smoothers.len()]) {
+                (Space::Grid(grid), Some(smoother)) => smoother.apply(grid, worth),
+                _ => worth.clone(),
+            }
+        });
+        let future = parallel::map(modes * actions, |index| {
+            let class = self.belief_mdp.levels().class_of(index % actions);
+            let look_up = |(state, entry): (usize, &Entry)| match &entry.next {
+                Next::End => 0.0,
+                Next::Restart => restart,
+                Next::Continue { mode, centre } => {
+                    let expected = &expected[mode * smoothers.len() + class];
+                    match &self.space {
+                        Space::Grid(grid) => grid.interpolate(expected, centre),
+                        Space::Points(_) => expected[state],
+                    }
+                }
+            };
+            entries[index].iter().enumerate().map(look_up).collect()
+        });
+        self.future = future;
+        let mut change = 0.0_f64;
+        for mode in 0..modes {
+            for (state, value) in self.values[mode].iter_mut().enumerate() {
+                let fresh = (mode * actions..(mode + 1) * actions)
+                    .map(|index| entries[index][state].reward + self.future[index][state])
+                    .fold(f64::NEG_INFINITY, f64::max);
+                change = change.max((fresh - *value).abs());
+                *value = fresh;
+            }
+        }
+        change
+    }
+
+    /// What it is worth to arrive in each state, seen from one step before.
+    fn worth(&self, mode: ModeId) -> Vec<f64> {
+        let (alive, failure, discount) = (
+            &self.model().episode.alive,
+            self.model().episode.failure_reward,
+            self.model().discount,
+        );
+        let worth = |(state, value): (usize, &f64)| {
+            if alive.sides.is_empty() || alive.contains(&self.space.state(state)) {
+                discount * value
+            } else {
+                failure
+            }
+        };
+        self.values[mode].iter().enumerate().map(worth).collect()
+    }
+
+    /// Discounted value of a fresh start, where something in the model leads there.
+    fn discounted_start(&self) -> f64 {
+        let model = self.model();
+        let restarts = model.actions.iter().any(|a| a.then == Then::Restart)
+            || model.events.iter().any(|event| event.then == Then::Restart);
+        if !restarts {
+            return 0.0;
+        }
+        let values = model.start.iter().enumerate().map(|(index, start)| {
+            let values = &self.values[start.mode];
+            let value = match &self.space {
+                Space::Points(_) => values[index],
+                Space::Grid(grid) => grid.interpolate(
+                    &grid.smoother(&start.covariance).apply(grid, values),
+                    start.mean.as_slice(),
+                ),
+            };
+            start.weight * value
+        });
+        model.discount * values.sum::<f64>()
+    }
+}
+
+/// `r(s, a)`, with the reward of the event that happens.
+fn reward(model: &Model, mode: ModeId, state: &[f64], action: ActionId) -> f64 {
+    let rewards = model
+        .rewards
+        .iter()
+        .filter(|reward| reward.applies(mode, action) && reward.region.contains(state));
+    let event = model
+        .events
+        .iter()
+        .find(|event| event.applies(mode, action) && event.region.contains(state));
+    rewards.map(|reward| reward.value).sum::<f64>() + event.map_or(0.0, |event| event.reward)
+}
+
+fn check(settings: &Settings) -> Result<()> {
+    let fail = |setting, value: String, range| {
+        Err(Error::Setting {
+            setting,
+            value,
+            range,
+        })
+    };
+    match settings.points {
+        Some(points) if points < 2 => return fail("points", points.to_string(), "at least 2"),
+        _ => {}
+    }
+    if settings.tolerance.is_nan() || settings.tolerance <= 0.0 {
+        return fail("tolerance", settings.tolerance.to_string(), "above 0");
+    }
+    if settings.sweeps == 0 {
+        return fail("sweeps", "0".to_owned(), "at least 1");
+    }
+    Ok(())
+}
+
+fn space(belief_mdp: &BeliefMdp, settings: &Settings) -> Result<Space> {
+    let model = belief_mdp.model();
+    let start = belief_mdp.start();
+    if model.belief.hypotheses == HypothesisBelief::Collapse
+        && let Some(points) = belief_mdp.hypotheses(start.level, &start.mean)
+    {
+        let points = points.into_iter().map(|(_, point)| point.clone());
+        return Ok(Space::Points(points.collect()));
+    }
+    let n = model.state_dim();
+    let points = settings.points.unwrap_or(match n {
+        1 => 1601,
+        2 => 161,
+        _ => 41,
+    });
+    // `V` and what it is smoothed to, `F` as it is and averaged over every level, and the entries.
+    let tables = model.modes.len()
+        * (1 + belief_mdp.levels().classes().len()
+            + model.actions.len() * (1 + belief_mdp.levels().len() + 6 + n));
+    let total = (points as u64).saturating_pow(n as u32);
+    let numbers = total.saturating_mul(tables as u64);
+    let mebibytes = numbers.saturating_mul(8) >> 20;
+    if mebibytes > settings.memory {
+        return Err(Error::TooLarge {
+            model: model.name.clone(),
+            points: numbers,
+            mebibytes,
+            limit: settings.memory,
+        });
+    }
+    let axes = (0..n).map(|variable| {
+        let bounds = model.state[variable].bounds;
+        if model.belief.walls == WallBelief::Clip {
+            return Axis::new(bounds.low, bounds.high, points);
+        }
+        let variance = belief_mdp
+            .levels()
+            .classes()
+            .iter()
+            .map(|class| class.motion_noise[(variable, variable)])
+            .fold(0.0, f64::max);
+        Axis::around(bounds, variance.sqrt(), points)
+    });
+    // Rewards jump at the borders of regions; straight lines do not overshoot there.
+    Ok(Space::Grid(Grid::new(
+        axes.collect(),
+        Interpolation::Linear,
+    )))
+}

@@ -1,0 +1,64 @@
+//! Most likely state: act as if the state that is most probable were certain.
+//!
+//! The most likely state of a Gaussian is its mean; of hypotheses that are points it is the one of largest weight, ties to the first.
+//!
+//! # References
+//! I. Nourbakhsh, R. Powers, S. Birchfield, "DERVISH: an office-navigating robot", AI Magazine 16(2), 1995.
+
+use super::mdp::{Settings, Space, StateMdp};
+use crate::belief::{Belief, BeliefMdp};
+use crate::error::Result;
+use crate::model::ActionId;
+use crate::observe::Observer;
+use crate::policy::Policy;
+
+/// The policy of the underlying decision process ([`super::mdp`]), asked at the most likely state.
+#[derive(Debug)]
+pub struct MostLikelyState {
+    mdp: StateMdp,
+}
+
+impl MostLikelyState {
+    /// Solves the underlying decision process.
+    ///
+    /// # Errors
+    /// As [`StateMdp::solve`].
+    pub fn solve(
+        belief_mdp: &BeliefMdp,
+        settings: &Settings,
+        observer: &dyn Observer,
+    ) -> Result<Self> {
+        let mdp = StateMdp::solve(belief_mdp, settings, observer)?;
+        Ok(Self { mdp })
+    }
+
+    /// Whether value iteration converged.
+    pub fn converged(&self) -> bool {
+        self.mdp.converged
+    }
+
+    /// The state that is most probable at a belief, length `n`.
+    pub fn most_likely(&self, belief: &Belief) -> Vec<f64> {
+        let points = match self.mdp.space() {
+            Space::Grid(_) => None,
+            Space::Points(_) => self.mdp.belief_mdp().hypotheses(belief.level, &belief.mean),
+        };
+        let heavier = |best: (f64, _), next: (f64, _)| if next.0 > best.0 { next } else { best };
+        match points.into_iter().flatten().reduce(heavier) {
+            Some((_, point)) => point.as_slice().to_vec(),
+            None => belief.mean.clone(),
+        }
+    }
+}
+
+impl Policy for MostLikelyState {
+    fn action(&self, belief: &Belief) -> ActionId {
+        self.mdp.action(belief.mode, &self.most_likely(belief))
+    }
+
+    /// What the most likely state is worth to an agent that is told it.
+    fn value(&self, belief: &Belief) -> Option<f64> {
+        let q = self.mdp.q_values(belief.mode, &self.most_likely(belief));
+        q.into_iter().reduce(f64::max)
+    }
+}

@@ -1,0 +1,23 @@
+//! Solvers: from a model, or from experience, to a policy. [`solve`] runs any of them by name.
+
+pub mod cma;
+pub mod compile;
+pub mod grid;
+pub mod hazard;
+pub mod kafaq;
+pub mod kbvi;
+pub mod lqg;
+pub mod lqr;
+pub mod mdp;
+pub mod mls;
+pub mod qmdp;
+pub mod refine;
+pub mod rollout;
+mod run;
+mod solution;
+mod solver;
+pub mod walled;
+
+pub use run::{SolveSettings, solve};
+pub use solution::{Form, Solution, Solved};
+pub use solver::SolverKind;

@@ -1,0 +1,94 @@
+//! Beliefs a policy meets, sampled from the model.
+
+use crate::belief::{Belief, BeliefMdp, Filter};
+use crate::model::ActionId;
+use crate::parallel;
+use crate::policy::Policy;
+use crate::simulate::{Agent, FilterAgent, run_episode};
+use crate::world::{Draws, ProblemWorld, World};
+
+/// One decision: where it was taken, what was done, and what was sensed on the way there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decision {
+    /// Belief at which it was taken.
+    pub belief: Belief,
+    /// Action taken.
+    pub action: ActionId,
+    /// What was sensed just before (length `m`); empty at the start of an episode.
+    pub observation: Vec<f64>,
+}
+
+/// Runs `episodes` episodes and returns the decisions of each. The same for any number of threads.
+///
+/// Where the start hypotheses of a belief are tracked, the agent is told which of them is true: one policy serves all of them.
+pub fn decisions(
+    mdp: &BeliefMdp,
+    filter: &Filter,
+    policy: &dyn Policy,
+    episodes: usize,
+    length: usize,
+    seed: u64,
+) -> Vec<Vec<Decision>> {
+    let model = mdp.model();
+    let told: Vec<Filter> = match mdp.starts() {
+        [_] => vec![filter.clone()],
+        starts => starts
+            .iter()
+            .map(|(_, start)| filter.clone().starting_at(start))
+            .collect(),
+    };
+    parallel::map(episodes, |episode| {
+        let mut world = ProblemWorld::new(model);
+        world.reset(&mut Draws::new(seed, episode as u64));
+        let mut agent = Recorder {
+            inner: FilterAgent::new(&told[world.hypothesis().min(told.len() - 1)], policy),
+            sensed: Vec::new(),
+            decisions: Vec::new(),
+        };
+        let mut observation = vec![0.0; model.observation_dim()];
+        let mut draws = Draws::new(seed, episode as u64);
+        run_episode(
+            &mut world,
+            &mut agent,
+            &mut draws,
+            &mut observation,
+            (length, model.discount),
+            &mut |_, _| {},
+        );
+        agent.decisions
+    })
+}
+
+/// An agent that writes down its decisions.
+struct Recorder<'a> {
+    inner: FilterAgent<'a>,
+    sensed: Vec<f64>,
+    decisions: Vec<Decision>,
+}
+
+impl Agent for Recorder<'_> {
+    fn reset(&mut self) {
+        self.sensed.clear();
+        self.inner.reset();
+    }
+
+    fn act(&mut self) -> ActionId {
+        let action = self.inner.act();
+        let observation = std::mem::take(&mut self.sensed);
+        self.decisions.push(Decision {
+            belief: self.inner.belief().clone(),
+            action,
+            observation,
+        });
+        action
+    }
+
+    fn observe(&mut self, action: ActionId, observation: &[f64]) {
+        self.sensed = observation.to_vec();
+        self.inner.observe(action, observation);
+    }
+
+    fn belief(&self) -> &Belief {
+        self.inner.belief()
+    }
+}

@@ -1,0 +1,113 @@
+//! What a solver hands over, in the form asked for.
+
+use super::lqg;
+use crate::belief::Filter;
+use crate::error::{Error, Result};
+use crate::model::{Model, suggest};
+use crate::observe::Observer;
+use crate::policy::{Automaton, Controller, Matching, Policy};
+use crate::simulate::{Evaluation, Options, evaluate};
+
+/// Form of the policy a solver hands over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Form {
+    /// An automaton matched by nearest neighbour (5.4.2).
+    #[default]
+    Nearest,
+    /// An automaton of belief segments (5.4.1).
+    Segments,
+    /// The planner itself, asked at every belief: nothing is compiled.
+    Grid,
+}
+
+impl Form {
+    /// All forms.
+    pub const ALL: [Self; 3] = [Self::Nearest, Self::Segments, Self::Grid];
+
+    /// Its name, as on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Nearest => "nearest",
+            Self::Segments => "segments",
+            Self::Grid => "grid",
+        }
+    }
+
+    /// The form of that name.
+    ///
+    /// # Errors
+    /// [`Error::Unknown`] with the nearest name.
+    pub fn parse(name: &str) -> Result<Self> {
+        let found = Self::ALL.into_iter().find(|form| form.name() == name);
+        found.ok_or_else(|| Error::Unknown {
+            what: "policy form",
+            name: name.to_owned(),
+            hint: suggest(name, Self::ALL.map(Self::name)),
+        })
+    }
+
+    /// How automata of this form are matched; nodes found on the way to a grid are points.
+    pub(super) fn matching(self) -> Matching {
+        match self {
+            Self::Nearest | Self::Grid => Matching::Nearest,
+            Self::Segments => Matching::Segments,
+        }
+    }
+}
+
+/// What a solver found.
+pub struct Solution {
+    /// The policy.
+    pub policy: Solved,
+    /// Return it expects from the start, where it knows.
+    pub planned_value: Option<f64>,
+    /// The horizon from which on the number of nodes no longer changes, where the solver has one (thesis 5.4).
+    pub policy_convergence_horizon: Option<usize>,
+    /// Uncertainty levels of the belief.
+    pub levels: usize,
+    /// Steps of experience used; `None` for planners.
+    pub samples: Option<u64>,
+    /// Whether the solver's own test of convergence was passed.
+    pub converged: bool,
+}
+
+/// A policy and all it takes to run it.
+// There is one at a time, so its size does not matter.
+#[allow(clippy::large_enum_variant)]
+pub enum Solved {
+    /// A finite automaton, with its filter inside.
+    Automaton(Automaton),
+    /// A feedback on the mean that gives a free control, with its filter inside.
+    Control(lqg::Controller),
+    /// A rule that is asked at every belief, and the filter that keeps the belief.
+    Rule {
+        /// The rule.
+        policy: Box<dyn Policy>,
+        /// Keeps the belief.
+        filter: Filter,
+    },
+}
+
+impl Solution {
+    /// The automaton, where it was compiled into one.
+    pub fn automaton(&self) -> Option<&Automaton> {
+        match &self.policy {
+            Solved::Automaton(automaton) => Some(automaton),
+            Solved::Control(_) | Solved::Rule { .. } => None,
+        }
+    }
+
+    /// Runs the policy in the model's world, by the standard of [`crate::simulate`].
+    pub fn evaluate(&self, model: &Model, options: Options, observer: &dyn Observer) -> Evaluation {
+        match &self.policy {
+            Solved::Automaton(automaton) => {
+                let controller = Controller::new(automaton);
+                evaluate(model, &automaton.filter, &controller, options, observer)
+            }
+            Solved::Control(controller) => controller.evaluate(options, observer),
+            Solved::Rule { policy, filter } => {
+                evaluate(model, filter, policy.as_ref(), options, observer)
+            }
+        }
+    }
+}

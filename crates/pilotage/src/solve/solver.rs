@@ -1,0 +1,134 @@
+//! The solvers by name: which there are, and what each accepts.
+
+use super::kbvi::quadratic;
+use super::{lqg, mdp};
+use crate::error::{Error, Result};
+use crate::model::{Interval, Model, When, suggest};
+
+/// The solvers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum SolverKind {
+    /// The thesis' open-loop branches (chapter 5).
+    Kbvi,
+    /// Closed-loop KBVI: value iteration on level and mean.
+    KbviClosed,
+    /// The linear-quadratic-Gaussian controller.
+    Lqg,
+    /// Q_MDP (Littman, Cassandra and Kaelbling, 1995).
+    Qmdp,
+    /// Most likely state (Nourbakhsh, Powers and Birchfield, 1995).
+    Mls,
+}
+
+impl SolverKind {
+    /// All solvers.
+    pub const ALL: [Self; 5] = [
+        Self::KbviClosed,
+        Self::Kbvi,
+        Self::Lqg,
+        Self::Qmdp,
+        Self::Mls,
+    ];
+
+    /// Its name, as on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Kbvi => "kbvi",
+            Self::KbviClosed => "kbvi-closed",
+            Self::Lqg => "lqg",
+            Self::Qmdp => "qmdp",
+            Self::Mls => "mls",
+        }
+    }
+
+    /// What it is, in one line.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Kbvi => "open-loop branches to a finite horizon (thesis chapter 5)",
+            Self::KbviClosed => "value iteration on uncertainty level and mean",
+            Self::Lqg => "linear feedback on the mean, for quadratic cost or the nearest action",
+            Self::Qmdp => "acts as if all uncertainty were gone after this step",
+            Self::Mls => "acts as if the most likely state were certain",
+        }
+    }
+
+    /// The solver of that name.
+    ///
+    /// # Errors
+    /// [`Error::Unknown`] with the nearest name.
+    pub fn parse(name: &str) -> Result<Self> {
+        let found = Self::ALL.into_iter().find(|kind| kind.name() == name);
+        found.ok_or_else(|| Error::Unknown {
+            what: "solver",
+            name: name.to_owned(),
+            hint: suggest(name, Self::ALL.map(Self::name)),
+        })
+    }
+
+    /// Whether it is made for such a model.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] with the reason, and what would do.
+    pub fn accepts(self, model: &Model) -> Result<()> {
+        let reason = match self {
+            Self::Kbvi => reward_missing(model).or_else(|| pays_afterwards(model)),
+            Self::KbviClosed if quadratic::suits(model) => None,
+            Self::KbviClosed => reward_missing(model).or_else(|| bound_missing(model)),
+            Self::Lqg => lqg::use_of(model).err(),
+            Self::Qmdp | Self::Mls => reward_missing(model)
+                .or_else(|| pays_afterwards(model))
+                .or_else(|| bound_missing(model))
+                .or_else(|| too_many_variables(model)),
+        };
+        match reason {
+            None => Ok(()),
+            Some(reason) => Err(Error::Unsupported {
+                solver: self.name(),
+                model: model.name.clone(),
+                reason,
+            }),
+        }
+    }
+}
+
+/// Planners that maximise reward need some, discounted.
+fn reward_missing(model: &Model) -> Option<String> {
+    if model.rewards.is_empty() && model.events.is_empty() && model.episode.failure_reward == 0.0 {
+        return Some("nothing in it pays a reward; add a [[reward]]".to_owned());
+    }
+    (model.discount >= 1.0).then(|| {
+        "its discount is 1, and a sum without end needs one below 1; set `discount` to 0.99 or less"
+            .to_owned()
+    })
+}
+
+/// Some solvers pay by `r(s, a)` only.
+fn pays_afterwards(model: &Model) -> Option<String> {
+    let rewards = model.rewards.iter().map(|reward| reward.when);
+    let mut asked = rewards.chain(model.events.iter().map(|event| event.when));
+    asked.any(|when| when == When::After).then(|| {
+        "it pays for where a step has led (`when = \"after\"`), and this solver only for where it begins; use kbvi-closed or state the rewards by action and place".to_owned()
+    })
+}
+
+/// Planners on a grid need to know where to put it.
+fn bound_missing(model: &Model) -> Option<String> {
+    let unbounded = model
+        .state
+        .iter()
+        .find(|variable| variable.bounds == Interval::ALL)?;
+    Some(format!(
+        "`{}` has no bounds to put a grid between; add `bounds` to [state]",
+        unbounded.name
+    ))
+}
+
+fn too_many_variables(model: &Model) -> Option<String> {
+    let (n, most) = (model.state_dim(), mdp::MOST_VARIABLES);
+    (n > most).then(|| {
+        format!(
+            "it has {n} state variables, and a grid of true states is fine enough for {most} at most; use kbvi-closed or lqg"
+        )
+    })
+}
