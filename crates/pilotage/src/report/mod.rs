@@ -1,0 +1,35 @@
+//! Pictures of policies and results, as SVG: automata, maps of the belief space, curves.
+//!
+//! Every function here turns data into the text of one self-contained SVG file. The same data always gives the same text.
+//! Colours are told apart by colour-blind readers and follow the reader's light or dark scheme; converters that know
+//! nothing of schemes draw the light one.
+
+mod automaton;
+mod axes;
+mod belief_map;
+mod curve;
+mod layout;
+mod palette;
+mod plot;
+mod sheet;
+mod svg;
+
+#[cfg(test)]
+mod tests;
+
+pub use automaton::automaton_svg;
+pub use belief_map::belief_map_svg;
+pub use curve::{Series, curves_svg};
+
+use crate::policy::Place;
+
+/// Whether a place has one number for each state variable. Segments may reach to infinity.
+fn is_sound(place: &Place, states: usize) -> bool {
+    match place {
+        Place::Point(point) => point.len() == states && point.iter().all(|x| x.is_finite()),
+        Place::Segment { lower, upper, .. } => {
+            (lower.len(), upper.len()) == (states, states)
+                && lower.iter().chain(upper).all(|x| !x.is_nan())
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! Running policies in worlds, and what they earn.
+
+mod agent;
+mod evaluate;
+mod life;
+pub mod wake_up;
+
+pub use agent::{Agent, FilterAgent};
+pub use evaluate::{Difference, Estimate, Evaluation, Options, compare, evaluate, evaluate_agents};
+pub(crate) use evaluate::{run_all, summarise};
+pub use life::{Life, LifeOptions, Run, life};
+
+use crate::model::{ActionId, Then};
+use crate::world::{Draws, World};
+
+/// What one episode earned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Episode {
+    /// Sum of `discount^t r_t`.
+    pub discounted: f64,
+    /// Sum of `r_t`.
+    pub undiscounted: f64,
+    /// Steps taken.
+    pub steps: usize,
+    /// Whether it ended in failure.
+    pub failed: bool,
+}
+
+/// One step of an episode, as a watcher sees it.
+#[derive(Debug)]
+pub struct Moment<'a> {
+    /// Steps taken before this one.
+    pub time: usize,
+    /// Action taken.
+    pub action: ActionId,
+    /// Reward collected.
+    pub reward: f64,
+    /// True state afterwards.
+    pub state: &'a [f64],
+    /// True mode afterwards.
+    pub mode: usize,
+    /// What was sensed afterwards.
+    pub observation: &'a [f64],
+    /// Whether the episode goes on.
+    pub then: Then,
+}
+
+/// Runs one episode of at most `length` steps. `observation` is a buffer for the sensor's `m` readings.
+///
+/// The order is that of POMDPs.jl: stop if the episode is over, act, collect the discounted reward, then update the belief.
+pub fn run_episode(
+    world: &mut dyn World,
+    agent: &mut dyn Agent,
+    draws: &mut Draws,
+    observation: &mut [f64],
+    (length, discount): (usize, f64),
+    watch: &mut dyn FnMut(&Moment<'_>, &dyn Agent),
+) -> Episode {
+    world.reset(draws);
+    agent.reset();
+    let mut episode = Episode {
+        discounted: 0.0,
+        undiscounted: 0.0,
+        steps: 0,
+        failed: false,
+    };
+    let mut weight = 1.0;
+    while episode.steps < length {
+        let action = agent.act();
+        let step = world.step(action, draws, observation);
+        episode.discounted += weight * step.reward;
+        episode.undiscounted += step.reward;
+        weight *= discount;
+        match step.then {
+            Then::Continue => agent.observe(action, observation),
+            Then::Restart => agent.reset(),
+            Then::End => {}
+        }
+        let moment = Moment {
+            time: episode.steps,
+            action,
+            reward: step.reward,
+            state: world.state(),
+            mode: world.mode(),
+            observation,
+            then: step.then,
+        };
+        watch(&moment, agent);
+        episode.steps += 1;
+        if step.then == Then::End {
+            episode.failed = step.failed;
+            break;
+        }
+    }
+    episode
+}
