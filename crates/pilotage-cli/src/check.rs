@@ -1,0 +1,124 @@
+//! `pilotage check`
+
+use std::io::Write;
+
+use clap::Args;
+use pilotage::belief::BeliefMdp;
+use pilotage::model;
+use pilotage::solve::SolverKind;
+use serde_json::json;
+
+use crate::failure::Failure;
+
+#[derive(Args)]
+pub struct Arguments {
+    /// A model file, or the name of a built-in problem.
+    #[arg(required_unless_present = "schema")]
+    file: Option<String>,
+    /// Print the JSON schema of model files instead.
+    #[arg(long, conflicts_with = "file")]
+    schema: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    let Some(file) = &arguments.file else {
+        writeln!(out, "{:#}", model::schema().as_value())?;
+        return Ok(());
+    };
+    let model = model::find(file)?;
+    let mdp = BeliefMdp::new(&model);
+    let levels = mdp.levels();
+    let sd = |level: usize| -> Vec<f64> {
+        levels
+            .covariance(level)
+            .diagonal()
+            .iter()
+            .map(|variance| variance.sqrt())
+            .collect()
+    };
+    let steady = levels.steady(levels.starts()[0], levels.class_of(0));
+    if arguments.json {
+        let report = json!({
+            "pilotage": env!("CARGO_PKG_VERSION"),
+            "problem": model.name,
+            "states": model.state.iter().map(|variable| &variable.name).collect::<Vec<_>>(),
+            "actions": model.actions.iter().map(|action| &action.name).collect::<Vec<_>>(),
+            "modes": model.modes,
+            "discount": model.discount,
+            "levels": levels.len(),
+            "start_deviation": sd(levels.starts()[0]),
+            "steady_deviation": steady.map(sd),
+            "solvers": SolverKind::ALL.iter().filter(|solver| solver.accepts(&model).is_ok()).map(|solver| solver.name()).collect::<Vec<_>>(),
+        });
+        writeln!(out, "{report}")?;
+        return Ok(());
+    }
+    let names = |names: Vec<&str>| names.join(", ");
+    let deviations = |values: Vec<f64>| {
+        values
+            .iter()
+            .map(|value| format!("{value:.4}"))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    writeln!(out, "{}: {}", model.name, model.about)?;
+    writeln!(
+        out,
+        "  states    {}",
+        names(
+            model
+                .state
+                .iter()
+                .map(|variable| variable.name.as_str())
+                .collect()
+        )
+    )?;
+    writeln!(
+        out,
+        "  actions   {}",
+        names(
+            model
+                .actions
+                .iter()
+                .map(|action| action.name.as_str())
+                .collect()
+        )
+    )?;
+    if model.modes.len() > 1 {
+        writeln!(
+            out,
+            "  modes     {}",
+            names(model.modes.iter().map(String::as_str).collect())
+        )?;
+    }
+    writeln!(out, "  discount  {}", model.discount)?;
+    let cut = if levels.converged() {
+        ""
+    } else {
+        " (cut at the limit)"
+    };
+    writeln!(out, "  levels    {}{cut}", levels.len())?;
+    writeln!(
+        out,
+        "  deviation {} at the start",
+        deviations(sd(levels.starts()[0]))
+    )?;
+    if let Some(steady) = steady {
+        writeln!(
+            out,
+            "            {} in the steady state",
+            deviations(sd(steady))
+        )?;
+    }
+    for solver in SolverKind::ALL {
+        match solver.accepts(&model) {
+            Ok(()) => writeln!(out, "  {:<12} can solve it", solver.name())?,
+            Err(reason) => writeln!(out, "  {:<12} cannot: {reason}", solver.name())?,
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,47 @@
+//! `pilotage draw`
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use pilotage::belief::BeliefMdp;
+use pilotage::policy::write_whole;
+use pilotage::report::{automaton_svg, belief_map_svg};
+
+use crate::failure::Failure;
+use crate::options::{beside, policy_and_problem};
+
+#[derive(Args)]
+pub struct Arguments {
+    /// A policy file written by `pilotage solve --out`.
+    policy: PathBuf,
+    /// Model file of the problem, where it is not a built-in one.
+    #[arg(long)]
+    problem: Option<String>,
+    /// Folder to write to; beside the policy file otherwise.
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let (automaton, model) = policy_and_problem(&arguments.policy, arguments.problem.as_deref())?;
+    let mdp = BeliefMdp::new(&model);
+    let pictures = [
+        ("automaton.svg", automaton_svg(&automaton)?),
+        (
+            "map.svg",
+            belief_map_svg(&mdp, &automaton, Some(&automaton))?,
+        ),
+    ];
+    let mut out = std::io::stdout().lock();
+    for (suffix, picture) in pictures {
+        let beside = beside(&arguments.policy, suffix);
+        let path = match (&arguments.out, beside.file_name()) {
+            (Some(folder), Some(name)) => folder.join(name),
+            _ => beside,
+        };
+        write_whole(&path, picture.as_bytes())?;
+        writeln!(out, "{}", path.display())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,155 @@
+//! `pilotage simulate`
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use pilotage::belief::BeliefMdp;
+use pilotage::model::Model;
+use pilotage::policy::{Automaton, Controller};
+use pilotage::simulate::evaluate;
+use pilotage::simulate::wake_up::{Settings, measure};
+use serde_json::json;
+
+use crate::failure::Failure;
+use crate::options::{Evaluation, policy_and_problem};
+use crate::progress::Bars;
+use crate::summary;
+
+#[derive(Args)]
+pub struct Arguments {
+    /// Name of a built-in problem, or a model file.
+    problem: String,
+    /// A policy file written by `pilotage solve --out`.
+    #[arg(long)]
+    policy: PathBuf,
+    /// Carry the robot to one of its start places, tell it so, and let it find out which (models with several starts).
+    #[arg(long)]
+    wake_up: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    evaluation: Evaluation,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    arguments.evaluation.start_threads()?;
+    let (automaton, model) = policy_and_problem(&arguments.policy, Some(&arguments.problem))?;
+    let bars = Bars::new(arguments.json);
+    if arguments.wake_up {
+        return wake_up(arguments, &model, &automaton, &bars);
+    }
+    let clock = Instant::now();
+    let evaluation = evaluate(
+        &model,
+        &automaton.filter,
+        &Controller::new(&automaton),
+        arguments.evaluation.options(),
+        &bars,
+    );
+    let seconds = clock.elapsed().as_secs_f64();
+    let mut out = std::io::stdout().lock();
+    if arguments.json {
+        let report = json!({
+            "pilotage": env!("CARGO_PKG_VERSION"),
+            "problem": model.name,
+            "solver": automaton.solver,
+            "policy": automaton.matching,
+            "seed": arguments.evaluation.seed,
+            "nodes": automaton.nodes.len(),
+            "planned_value": automaton.planned_value,
+            "evaluation": evaluation,
+            "seconds": { "evaluate": seconds },
+        });
+        writeln!(out, "{report}")?;
+    } else {
+        writeln!(
+            out,
+            "{}",
+            summary::heading(&model.name, &automaton.solver, Some(automaton.nodes.len()))
+        )?;
+        write!(
+            out,
+            "{}",
+            summary::evaluation(&evaluation, automaton.planned_value)
+        )?;
+    }
+    Ok(())
+}
+
+fn wake_up(
+    arguments: &Arguments,
+    model: &Model,
+    automaton: &Automaton,
+    bars: &Bars,
+) -> Result<(), Failure> {
+    let settings = Settings {
+        episodes: arguments.evaluation.episodes,
+        seed: arguments.evaluation.seed,
+        ..Settings::default()
+    };
+    let clock = Instant::now();
+    let policy = Controller::new(automaton);
+    let result = measure(&BeliefMdp::new(model), &policy, &settings, bars)?;
+    let mut out = std::io::stdout().lock();
+    if arguments.json {
+        let report = json!({
+            "pilotage": env!("CARGO_PKG_VERSION"),
+            "problem": model.name,
+            "solver": automaton.solver,
+            "policy": automaton.matching,
+            "seed": settings.seed,
+            "nodes": automaton.nodes.len(),
+            "wake_up": result,
+            "seconds": { "evaluate": clock.elapsed().as_secs_f64() },
+        });
+        writeln!(out, "{report}")?;
+        return Ok(());
+    }
+    writeln!(
+        out,
+        "{}: {} kidnappings, at most {} steps each\n",
+        model.name, result.episodes, model.episode.length
+    )?;
+    for (who, reached) in [
+        ("woken up lost", &result.lost),
+        ("told its start", &result.told),
+    ] {
+        writeln!(
+            out,
+            "  {who:<15} reached the goal {}, discounted return {}",
+            summary::estimate(&reached.success),
+            summary::estimate(&reached.discounted)
+        )?;
+    }
+    writeln!(
+        out,
+        "  lost over told  {}\n",
+        summary::estimate(&result.ratio)
+    )?;
+    writeln!(out, "  one hypothesis left after")?;
+    for (steps, &count) in result
+        .alone_after
+        .iter()
+        .enumerate()
+        .filter(|&(_, &count)| count > 0)
+    {
+        writeln!(
+            out,
+            "  {steps:>6} steps  {:>6.2} %",
+            share(count, result.episodes)
+        )?;
+    }
+    writeln!(
+        out,
+        "         never  {:>6.2} %",
+        share(result.never_alone, result.episodes)
+    )?;
+    Ok(())
+}
+
+fn share(count: usize, of: usize) -> f64 {
+    100.0 * count as f64 / of as f64
+}

@@ -1,0 +1,228 @@
+//! `pilotage solve`
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use pilotage::model::{self, Model, WallBelief, Walls};
+use pilotage::simulate::Evaluation as Earned;
+use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
+use pilotage::solve::lqg::Weights;
+use pilotage::solve::{Form, Solution, SolveSettings, SolverKind, solve};
+use serde_json::json;
+
+use crate::failure::Failure;
+use crate::options::{Evaluation, at_least_one};
+use crate::progress::Bars;
+use crate::summary;
+
+#[derive(Args)]
+pub struct Arguments {
+    /// Name of a built-in problem (see `pilotage list`), or a model file.
+    problem: String,
+    /// Solver to use (see `pilotage list`).
+    #[arg(long, value_name = "SOLVER", default_value = "kbvi-closed")]
+    with: String,
+    /// Form of the policy: nearest, segments, or grid (the planner itself, not compiled).
+    #[arg(long, value_name = "FORM", default_value = "nearest")]
+    policy: String,
+    /// Write the policy to this file.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    evaluation: Evaluation,
+    #[command(flatten)]
+    planner: Planner,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Planner settings")]
+struct Planner {
+    /// Points of the grid along each variable.
+    #[arg(long, value_name = "POINTS")]
+    grid: Option<usize>,
+    /// Most memory for the grid, MiB.
+    #[arg(long, value_name = "MIB", default_value_t = SolveSettings::default().memory)]
+    memory: u64,
+    /// First horizon that kbvi tries.
+    #[arg(long, value_name = "STEPS", default_value_t = *SolveSettings::default().horizons.start())]
+    first_horizon: usize,
+    /// Last horizon that kbvi tries.
+    #[arg(long, value_name = "STEPS", default_value_t = *SolveSettings::default().horizons.end())]
+    last_horizon: usize,
+    /// Steps for which kbvi keeps an action once chosen.
+    #[arg(long, value_name = "STEPS", default_value_t = 1, value_parser = at_least_one)]
+    group: usize,
+    /// Episodes a planner runs to see which beliefs its policy meets.
+    #[arg(long, value_name = "EPISODES", value_parser = at_least_one)]
+    runs: Option<usize>,
+    /// Factor on the length of a policy search's simulations: less is faster, more is thorougher.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    effort: f64,
+    /// kbvi looks less far ahead with every step of an episode.
+    #[arg(long)]
+    decreasing: bool,
+    /// Formulas kbvi uses.
+    #[arg(long, value_enum, default_value_t = Formula::Exact)]
+    formulas: Formula,
+    /// What a deviation of each state variable costs lqg, comma-separated; default: the model's own cost, or 1 at each limit.
+    #[arg(long, value_name = "WEIGHTS", value_delimiter = ',')]
+    state_weights: Option<Vec<f64>>,
+    /// What each control costs lqg, comma-separated; default: the model's own cost, or 1 at the largest of an action.
+    #[arg(long, value_name = "WEIGHTS", value_delimiter = ',')]
+    control_weights: Option<Vec<f64>>,
+}
+
+/// Sets of formulas.
+#[derive(Clone, Copy, ValueEnum)]
+enum Formula {
+    /// The corrected ones.
+    Exact,
+    /// Rewards as ramps, everything else corrected.
+    Ramp,
+    /// As printed in the thesis.
+    Printed,
+}
+
+impl Formula {
+    fn set(self) -> Formulas {
+        match self {
+            Self::Exact => Formulas::default(),
+            Self::Ramp => Formulas {
+                reward: RewardFormula::Ramp,
+                ..Formulas::default()
+            },
+            Self::Printed => Formulas {
+                reward: RewardFormula::Ramp,
+                spread: SpreadFormula::Printed,
+                integral: IntegralFormula::Printed,
+            },
+        }
+    }
+}
+
+impl Arguments {
+    fn settings(&self) -> Result<SolveSettings, Failure> {
+        Ok(SolveSettings {
+            form: Form::parse(&self.policy)?,
+            seed: self.evaluation.seed,
+            points: self.planner.grid,
+            memory: self.planner.memory,
+            horizons: self.planner.first_horizon..=self.planner.last_horizon,
+            runs: self.planner.runs,
+            group: self.planner.group,
+            effort: self.planner.effort,
+            decreasing: self.planner.decreasing,
+            formulas: self.planner.formulas.set(),
+            weights: Weights {
+                state: self.planner.state_weights.clone(),
+                control: self.planner.control_weights.clone(),
+            },
+        })
+    }
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let solver = SolverKind::parse(&arguments.with)?;
+    let settings = arguments.settings()?;
+    if arguments.out.is_some() && settings.form == Form::Grid {
+        return Err(Failure::Usage(
+            "a planner that is not compiled cannot be saved; choose --policy nearest or segments"
+                .to_owned(),
+        ));
+    }
+    let model = model::find(&arguments.problem)?;
+    arguments.evaluation.start_threads()?;
+    let bars = Bars::new(arguments.json);
+
+    let clock = Instant::now();
+    let solution = solve(solver, &model, &settings, &bars)?;
+    let solve_seconds = clock.elapsed().as_secs_f64();
+    if let (Some(path), Some(automaton)) = (&arguments.out, solution.automaton()) {
+        automaton.save(path)?;
+    }
+    let clock = Instant::now();
+    let earned = solution.evaluate(&model, arguments.evaluation.options(), &bars);
+    let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
+
+    let mut out = std::io::stdout().lock();
+    if arguments.json {
+        writeln!(
+            out,
+            "{}",
+            report(arguments, &model, solver, &solution, &earned, seconds)
+        )?;
+    } else {
+        write!(
+            out,
+            "{}",
+            shown(arguments, &model, solver, &solution, &earned, seconds)
+        )?;
+    }
+    Ok(())
+}
+
+fn report(
+    arguments: &Arguments,
+    model: &Model,
+    solver: SolverKind,
+    solution: &Solution,
+    earned: &Earned,
+    (solve, evaluate): (f64, f64),
+) -> serde_json::Value {
+    json!({
+        "pilotage": env!("CARGO_PKG_VERSION"),
+        "problem": model.name,
+        "solver": solver.name(),
+        "policy": arguments.policy,
+        "seed": arguments.evaluation.seed,
+        "converged": solution.converged,
+        "policy_convergence_horizon": solution.policy_convergence_horizon,
+        "levels": solution.levels,
+        "nodes": solution.automaton().map(|automaton| automaton.nodes.len()),
+        "planned_value": solution.planned_value,
+        "samples": solution.samples,
+        "evaluation": earned,
+        "seconds": { "solve": solve, "evaluate": evaluate },
+    })
+}
+
+fn shown(
+    arguments: &Arguments,
+    model: &Model,
+    solver: SolverKind,
+    solution: &Solution,
+    earned: &Earned,
+    (solve, evaluate): (f64, f64),
+) -> String {
+    let nodes = solution.automaton().map(|automaton| automaton.nodes.len());
+    let mut lines = vec![summary::heading(&model.name, solver.name(), nodes)];
+    lines.extend(solution.automaton().map(summary::nodes));
+    lines.push(String::new());
+    lines.push(summary::evaluation(earned, solution.planned_value));
+    if model.world.walls == Walls::Clamp && model.belief.walls == WallBelief::Ignore {
+        lines.push("  the filter does not know of the walls, so the plan expects another return than is earned".to_owned());
+    }
+    if let Some(horizon) = solution.policy_convergence_horizon {
+        lines.push(format!("  policy convergence horizon {horizon}"));
+    }
+    if !solution.converged {
+        lines.push("  not converged: the policy still changes with more work; see --help for what can be raised".to_owned());
+    }
+    lines.push(format!(
+        "  {solve:.2} s to solve, {evaluate:.2} s to evaluate, seed {}",
+        arguments.evaluation.seed
+    ));
+    if let Some(path) = &arguments.out {
+        lines.push(format!(
+            "  kept in {0}; `pilotage draw {0}` draws it",
+            path.display()
+        ));
+    }
+    lines.push(String::new());
+    lines.join("\n")
+}

@@ -1,0 +1,132 @@
+//! Results as text for people.
+
+use std::fmt::Write as _;
+
+use comfy_table::presets;
+use comfy_table::{CellAlignment, Table};
+use pilotage::policy::{Automaton, Place};
+use pilotage::simulate::{Estimate, Evaluation};
+
+/// Rows of a node table that are shown before it is cut.
+const ROWS: usize = 24;
+
+/// What was solved, with what, and how large the automaton is where there is one.
+pub fn heading(problem: &str, solver: &str, nodes: Option<usize>) -> String {
+    let size = match nodes {
+        None => "the planner itself, not compiled".to_owned(),
+        Some(1) => "1 node".to_owned(),
+        Some(nodes) => format!("{nodes} nodes"),
+    };
+    format!("{problem}, solved with {solver}: {size}\n")
+}
+
+pub fn estimate(estimate: &Estimate) -> String {
+    format!("{:.4} ± {:.4}", estimate.mean, estimate.stderr)
+}
+
+pub fn evaluation(evaluation: &Evaluation, planned: Option<f64>) -> String {
+    let mut text = String::new();
+    let planned = planned.map_or(String::new(), |value| format!("   (planned {value:.4})"));
+    let _ = writeln!(
+        text,
+        "  discounted return    {}{planned}",
+        estimate(&evaluation.discounted)
+    );
+    let _ = writeln!(
+        text,
+        "  undiscounted return  {}",
+        estimate(&evaluation.undiscounted)
+    );
+    let _ = writeln!(
+        text,
+        "  steps per episode    {}",
+        estimate(&evaluation.steps)
+    );
+    if evaluation.failed > 0.0 {
+        let _ = writeln!(
+            text,
+            "  episodes that failed {:.2} %",
+            100.0 * evaluation.failed
+        );
+    }
+    let _ = writeln!(
+        text,
+        "  mean ± standard error over {} episodes",
+        evaluation.episodes
+    );
+    text
+}
+
+/// The automaton as a table: where a node is, what it does, what it is worth, where it comes from.
+pub fn nodes(automaton: &Automaton) -> String {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    let modes = automaton.modes.len() > 1;
+    let mut header = vec!["node", "level"];
+    if modes {
+        header.push("mode");
+    }
+    let place = automaton.states.join(", ");
+    header.extend([place.as_str(), "action", "value", "time", "reached from"]);
+    table.set_header(header);
+    for (id, node) in automaton.nodes.iter().enumerate().take(ROWS) {
+        let mut row = vec![id.to_string(), levels(node.levels)];
+        if modes {
+            row.push(automaton.modes[node.mode].clone());
+        }
+        let from: Vec<String> = node
+            .predecessors
+            .iter()
+            .take(4)
+            .map(|(from, _)| from.to_string())
+            .collect();
+        row.extend([
+            shown(&node.place),
+            automaton.actions[node.action].clone(),
+            node.value
+                .map_or_else(String::new, |value| format!("{value:.3}")),
+            format!("{:.1} %", 100.0 * node.visits),
+            from.join(" "),
+        ]);
+        table.add_row(row);
+    }
+    for column in [0, 1] {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    let rest = automaton.nodes.len().saturating_sub(ROWS);
+    let more = if rest > 0 {
+        format!("\n  and {rest} more; --out FILE keeps them all")
+    } else {
+        String::new()
+    };
+    format!("{table}{more}")
+}
+
+fn levels((first, last): (usize, usize)) -> String {
+    if first == last {
+        first.to_string()
+    } else {
+        format!("{first}-{last}")
+    }
+}
+
+fn shown(place: &Place) -> String {
+    let list = |values: &[f64]| {
+        values
+            .iter()
+            .map(|value| format!("{value:.2}"))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    match place {
+        Place::Point(point) => list(point),
+        Place::Segment { lower, upper, .. } => lower
+            .iter()
+            .zip(upper)
+            .map(|(low, high)| format!("[{low:.2}, {high:.2}]"))
+            .collect::<Vec<_>>()
+            .join(" x "),
+    }
+}
