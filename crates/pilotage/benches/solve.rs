@@ -1,0 +1,94 @@
+//! Planning and simulating the corridor: the whole of `solve corridor`, and its parts.
+#![allow(clippy::unwrap_used)]
+
+use divan::{Bencher, counter::ItemsCount};
+use pilotage::belief::BeliefMdp;
+use pilotage::model::{self, Model};
+use pilotage::observe::Silent;
+use pilotage::policy::{Controller, Policy};
+use pilotage::simulate::{Evaluation, Options, evaluate};
+use pilotage::solve::compile::{self, compile};
+use pilotage::solve::kbvi::closed;
+
+fn main() {
+    divan::main();
+}
+
+const EPISODES: usize = 10_000;
+
+/// Read, plan, compile, evaluate.
+#[divan::bench(sample_count = 10)]
+fn whole() -> Evaluation {
+    let corridor = read();
+    let policy = plan(&BeliefMdp::new(&corridor));
+    let automaton = compile(
+        &policy,
+        policy.mdp(),
+        "kbvi-closed",
+        &compile::Settings::default(),
+    );
+    simulate(&corridor, &Controller::new(&automaton.unwrap()))
+}
+
+#[divan::bench]
+fn read() -> Model {
+    model::find("corridor").unwrap()
+}
+
+#[divan::bench(sample_count = 10)]
+fn plan_only(bencher: Bencher) {
+    let mdp = BeliefMdp::new(&read());
+    bencher.bench(|| plan(&mdp));
+}
+
+#[divan::bench(sample_count = 10)]
+fn compile_only(bencher: Bencher) {
+    let policy = plan(&BeliefMdp::new(&read()));
+    bencher.bench(|| {
+        compile(
+            &policy,
+            policy.mdp(),
+            "kbvi-closed",
+            &compile::Settings::default(),
+        )
+    });
+}
+
+/// Episodes of sixty steps.
+#[divan::bench(sample_count = 10)]
+fn episodes_of_the_automaton(bencher: Bencher) {
+    let corridor = read();
+    let policy = plan(&BeliefMdp::new(&corridor));
+    let automaton = compile(
+        &policy,
+        policy.mdp(),
+        "kbvi-closed",
+        &compile::Settings::default(),
+    );
+    let controller = Controller::new(&automaton.unwrap());
+    bencher
+        .counter(ItemsCount::new(EPISODES))
+        .bench(|| simulate(&corridor, &controller));
+}
+
+#[divan::bench(sample_count = 10)]
+fn episodes_of_the_grid(bencher: Bencher) {
+    let corridor = read();
+    let policy = plan(&BeliefMdp::new(&corridor));
+    bencher
+        .counter(ItemsCount::new(EPISODES))
+        .bench(|| simulate(&corridor, &policy));
+}
+
+fn plan(mdp: &BeliefMdp) -> closed::GridPolicy {
+    closed::solve(mdp, &closed::Settings::default(), &Silent).unwrap()
+}
+
+fn simulate(model: &Model, policy: &dyn Policy) -> Evaluation {
+    let filter = BeliefMdp::new(model).filter();
+    let options = Options {
+        episodes: EPISODES,
+        seed: 1,
+    };
+    evaluate(model, &filter, policy, options, &Silent)
+}

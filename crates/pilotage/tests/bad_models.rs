@@ -1,0 +1,254 @@
+//! Every mistake in a model file has a message with a place and a hint. Each row of the table edits a good file once.
+#![allow(clippy::unwrap_used)]
+
+use pilotage::model::{self, ModelError};
+
+/// One mistake: in the built-in model `base`, `good` is replaced by `bad`. The error is placed at the first occurrence of
+/// `at` in the edited text.
+struct Mistake {
+    base: &'static str,
+    good: &'static str,
+    bad: &'static str,
+    at: &'static str,
+    message: &'static str,
+    hint: &'static str,
+}
+
+const fn row(
+    base: &'static str,
+    good: &'static str,
+    bad: &'static str,
+    at: &'static str,
+    message: &'static str,
+    hint: &'static str,
+) -> Mistake {
+    Mistake {
+        base,
+        good,
+        bad,
+        at,
+        message,
+        hint,
+    }
+}
+
+const START: &str = "mean = [0.0]";
+const GOAL: &str = "in = { x = [3.0, 4.0] }";
+const EAST: &str = "EAST = { u = [1.0] }";
+
+#[rustfmt::skip]
+const MISTAKES: &[Mistake] = &[
+    // Not TOML, or not this format.
+    row("corridor", "discount = 0.75", "discount 0.75", "0.75", "expected", "TOML"),
+    row("corridor", "name = \"corridor\"", "name = \"corridor", "\nabout", "invalid", "TOML"),
+    row("corridor", "format = 1", "format = 2", "2", "format 2", "reads format 1"),
+    row("corridor", "format = 1", "", "#:schema", "`format` is missing", "add `format`"),
+    row("corridor", "format = 1", "format = \"1\"", "\"1\"", "string \"1\"", "whole number"),
+    row("corridor", "discount = 0.75", "", "#:schema", "`discount` is missing", "add `discount`"),
+    row("corridor", "discount = 0.75", "discount = \"high\"", "\"high\"", "unexpected string", "write a number"),
+    row("corridor", "discount = 0.75", "discount = 0.75\ndiscount = 0.8", "discount = 0.8", "twice", "rename or delete"),
+    // Unknown keys, with the nearest known one.
+    row("corridor", "discount =", "discont =", "discont", "unknown key `discont`", "`discount`"),
+    row("corridor", "covariance = ", "variance = ", "variance", "unknown key `variance`", "`covariance`"),
+    row("corridor", "names = ", "name = ", "name = [", "unknown key `name`", "`names`"),
+    row("corridor", EAST, "EAST = { v = [1.0] }", "v = [1.0] }", "unknown key `v`", "`u`"),
+    row("corridor", "value = 1.0", "value = 1.0\ncolour = \"red\"", "colour", "unknown key `colour`", "known here: `action`"),
+    row("corridor", "walls = \"clamp\"", "walls = \"clamps\"", "\"clamps\"", "unknown value `clamps`", "`clamp`"),
+    row("corridor", "length = 60", "lenght = 60", "lenght", "unknown key `lenght`", "`length`"),
+    row("cart-pole", "cart_mass", "cart_masss", "cart_masss", "unknown key `cart_masss`", "`cart_mass`"),
+    // Numbers.
+    row("corridor", "discount = 0.75", "discount = 1.0", "1.0", "the discount is 1", "a [cost]"),
+    row("corridor", "discount = 0.75", "discount = -0.5", "-0.5", "the discount is -0.5", "from 0"),
+    row("corridor", "discount = 0.75", "discount = nan", "nan", "not a number", "finite"),
+    row("scalar-lqg", "discount = 1.0", "discount = 1.5", "1.5", "the discount is 1.5", "from 0"),
+    row("scalar-lqg", "length = 10", "", "1.0 # a finite", "a discount of 1 needs a stated length", "`length`"),
+    row("corridor", "A = [[1.0]]", "A = [[inf]]", "inf", "infinite", "finite"),
+    row("corridor", "A = [[1.0]]", "A = [[nan]]", "nan", "not a number", "finite"),
+    row("corridor", START, "mean = [-inf]", "-inf", "infinite", "finite"),
+    row("corridor", EAST, "EAST = { u = [nan] }", "nan", "not a number", "finite"),
+    row("corridor", "value = 1.0", "value = inf", "inf", "infinite", "finite"),
+    row("corridor", "[[0.0, 4.0]]", "[[0.0, inf]]", "inf", "infinite", "finite"),
+    row("corridor", "noise = [[0.45]]", "noise = [[inf]]", "inf", "infinite", "finite"),
+    row("load-unload", "reward = 1.0", "reward = nan", "nan", "not a number", "finite"),
+    row("cart-pole", "length = 0.3", "length = 0.0", "0.0\ninertia", "this is 0", "more than 0"),
+    row("cart-pole", "force_noise = 0.45", "force_noise = -1", "-1 # act", "this is -1", "0 or more"),
+    row("corridor", "length = 60", "length = 0", "0 # 0.75", "no steps", "at least 1"),
+    row("corridor", "length = 60", "length = -1", "-1 # 0.75", "-1", "not negative"),
+    row("tiger", "level_tolerance = 1e-4", "level_tolerance = -1e-4", "-1e-4", "the tolerance is", "0 or more"),
+    row("tiger", "level_tolerance = 1e-4", "level_limit = 0", "0 # the variance", "no level", "at least 1"),
+    // Shapes.
+    row("corridor", "A = [[1.0]]", "A = [[1.0, 0.0]]", "[[1.0, 0.0]]", "a 1 x 2 matrix where 1 x 1 belongs", "1 state variable"),
+    row("corridor", "B = [[1.0]]", "B = [[1.0], [0.0]]", "[[1.0], [0.0]]", "a 2 x 1 matrix where 1 x 1 belongs", "1 state variable"),
+    row("corridor", "H = [[1.0]]", "H = [[1.0, 2.0]]", "[[1.0, 2.0]]", "a 1 x 2 matrix where 1 x 1 belongs", "1 state variable"),
+    row("corridor", "H = [[1.0]]", "H = [[1.0], [1.0]]", "[[0.45]]", "a 1 x 1 matrix where 2 x 2 belongs", "2 readings"),
+    row("corridor", "covariance = [[0.30]]", "covariance = []", "[] #", "a 0 x 0 matrix where 1 x 1 belongs", "1 state variable"),
+    row("corridor", "A = [[1.0]]", "A = 1.0", "1.0\nB", "unexpected", "a list"),
+    row("corridor", START, "mean = [0.0, 0.0]", "[0.0, 0.0]", "2 numbers where 1 belong", "1 state variable"),
+    row("corridor", EAST, "EAST = { u = [1.0, 2.0] }", "[1.0, 2.0]", "2 numbers where 1 belong", "1 control"),
+    row("maze-2d", "A = [[1.0, 0.0], [0.0, 1.0]]", "A = [[1.0, 0.0], [0.0]]", "[0.0]]", "row 2 has 1 number", "equally long"),
+    row("maze-2d", "NORTH = { u = [0.0, 1.0] }", "NORTH = { u = [0.0, 1.0], noise = [[0.1]] }", "[[0.1]]", "a 1 x 1 matrix where 2 x 2", "2 state variables"),
+    row("corridor", "[[0.0, 4.0]]", "[[0.0, 4.0], [0.0, 1.0]]", "[[0.0, 4.0], [0.0", "2 pairs of bounds for 1 state variable", "`names`"),
+    row("corridor", "[[0.0, 4.0]]", "[[0.0, 4.0, 5.0]]", "[0.0, 4.0, 5.0]", "length 3", "two numbers"),
+    row("scalar-lqg", "control = [[1.0]]", "control = [[1.0, 0.0], [0.0, 1.0]]", "[[1.0, 0.0]", "a 2 x 2 matrix where 1 x 1", "1 control"),
+    row("corridor", "[world]", "[world]\nkind = \"cart-pole\"", "\"cart-pole\"", "parameters of the cart and pole are missing", "[world.cart-pole]"),
+    row("corridor", "[world]", "[world]\nkind = \"boat\"", "\"boat\"", "unknown value `boat`", "`linear`"),
+    // Covariances.
+    row("maze-2d", "noise = [[0.15, 0.0], [0.0, 0.15]]", "noise = [[0.15, 0.1], [0.2, 0.15]]", "0.1],", "row 1, column 2 is 0.1 and row 2, column 1 is 0.2", "the same"),
+    row("maze-2d", "noise = [[0.20, 0.0], [0.0, 0.20]]", "noise = [[0.2, 0.3], [0.3, 0.2]]", "[[0.2, 0.3]", "eigenvalue is -0.1", "correlations"),
+    row("corridor", "covariance = [[0.30]]", "covariance = [[-0.3]]", "[[-0.3]]", "eigenvalue is -0.3", "negative"),
+    row("tiger", "LISTEN = {}", "LISTEN = { sensor_noise = [[-1.0]] }", "[[-1.0]]", "eigenvalue is -1", "negative"),
+    // Regions.
+    row("corridor", GOAL, "in = { x = [3.0, 3.0] }", "[3.0, 3.0]", "the region [3, 3] is empty", "lower end first"),
+    row("corridor", GOAL, "in = { x = [4.0, 3.0] }", "[4.0, 3.0]", "the region [4, 3] is inverted", "lower end first"),
+    row("corridor", GOAL, "in = { x = [nan, 3.0] }", "[nan, 3.0]", "not a number", "`-inf`"),
+    row("corridor", "[[0.0, 4.0]]", "[[4.0, 0.0]]", "[4.0, 0.0]", "the bounds [4, 0] is inverted", "lower end first"),
+    row("corridor", GOAL, "in = { y = [3.0, 4.0] }", "y = [3.0", "unknown state variable `y`", "`x`"),
+    row("corridor", GOAL, "in = 3", "3\nvalue", "unexpected number `3`", "intervals such as"),
+    row("corridor", GOAL, "in = \"*\"", "\"*\"", "this model has no map", "add a [map]"),
+    row("cart-pole", "alive = { position", "alive = { positon", "positon", "unknown state variable `positon`", "`position`"),
+    row("corridor", "length = 60", "length = 60\nfailure_reward = -1.0", "failure_reward", "nothing says what failure is", "`alive"),
+    // Names.
+    row("tiger", "action = \"LISTEN\"", "action = \"LISTN\"", "\"LISTN\"", "unknown action `LISTN`", "`LISTEN`"),
+    row("tiger", "action = \"LISTEN\"", "action = [\"OPEN-LEFT\", \"SHOUT\"]", "\"SHOUT\"", "unknown action `SHOUT`", "`LISTEN`, `OPEN-LEFT`"),
+    row("tiger", "action = \"LISTEN\"", "action = []", "[]\n", "list of actions is empty", "delete the key"),
+    row("corridor", GOAL, "mode = \"loaded\"", "\"loaded\"", "unknown mode `loaded`", "none is declared"),
+    row("load-unload", "becomes = \"loaded\"", "becomes = \"laoded\"", "\"laoded\"", "unknown mode `laoded`", "`loaded`"),
+    row("load-unload", "action = \"UNLOAD\"", "action = \"UNLAOD\"", "\"UNLAOD\"", "unknown action `UNLAOD`", "`UNLOAD`"),
+    row("load-unload", "in = { x = [0.0, 1.0] }", "in = { z = [0.0, 1.0] }", "z = [0.0", "unknown state variable `z`", "`x`"),
+    row("load-unload", "mode = \"empty\"\nmean", "mode = \"full\"\nmean", "\"full\"", "unknown mode `full`", "`empty`"),
+    row("corridor", "WEST = {", "EAST = {", "EAST = { u = [-1.0]", "twice", "rename"),
+    row("maze-2d", "names = [\"x\", \"y\"]", "names = [\"x\", \"x\"]", "\"x\"] ", "two state variables are called `x`", "rename"),
+    row("load-unload", "\"empty\", \"loaded\"]", "\"empty\", \"empty\"]", "\"empty\"]", "two modes are called `empty`", "rename"),
+    row("corridor", "names = [\"x\"]", "names = []", "[]\n", "no state variable", "name at least one"),
+    row("corridor", "name = \"corridor\"", "name = \"\"", "\"\"\n", "no name", "short name"),
+    row("tiger", "[actions]\nLISTEN = {}\nOPEN-LEFT = { then = \"end\" }\nOPEN-RIGHT = { then = \"end\" }", "[actions]", "[actions]", "no action", "STOP"),
+    row("tiger", "then = \"end\"", "then = \"ends\"", "\"ends\"", "unknown value `ends`", "`end`"),
+    // Starts.
+    row("tiger", "weight = 0.5", "weight = 0.7", "0.5", "sum to 1.2", "sum to 1"),
+    row("tiger", "weight = 0.5", "weight = -0.5", "-0.5", "the weight is -0.5", "above 0"),
+    row("corridor", START, "mean = [-0.5]", "-0.5", "x = -0.5 is outside the bounds", "between 0 and 4"),
+    row("cart-pole", "[episode]", "[episode]\nfailure_reward = nan", "nan", "not a number", "finite"),
+    row("cart-pole", "alive = { position = [-2.4, 2.4]", "alive = { position = [1.0, 2.4]", "[0.0, 0.0, 0.0, 0.0]", "outside `episode.alive`", "start inside"),
+    // Cart and pole.
+    row("cart-pole", "linearise = \"cart-pole\"", "linearise = \"cart-pole\"\nA = [[1.0]]", "A = [[", "also comes from `linearise`", "delete"),
+    row("cart-pole", "linearise = \"cart-pole\"", "A = [[1.0]]", "[motion]", "`noise` is missing", "add `noise`"),
+    row("cart-pole", "kind = \"cart-pole\"", "kind = \"linear\"\n[world.cart-poles]", "cart-poles", "unknown key `cart-poles`", "`cart-pole`"),
+    row("cart-pole", "gravity = 9.8\n", "", "[world.cart-pole]", "`gravity` is missing", "add `gravity`"),
+    // Walls and maps.
+    row("corridor", "bounds = [[0.0, 4.0]]", "", "\"clamp\"", "there are no bounds", "add `bounds`"),
+    row("maze-2d", "....\n...*", "...\n...*", "...\n...*", "row 3 has 3 characters and the first row has 4", "equally long"),
+    row("maze-2d", "....\n...*", ".@..\n...*", "@..\n", "unknown character `@`", "`#` is blocked"),
+    row("maze-2d", "....\n...*", "....\n....", "\"*\"", "no cell of the map is marked `*`", "it has no marks"),
+    row("maze-2d", "in = \"*\"", "in = \"g\"", "\"g\"", "no cell of the map is marked `g`", "its marks: `*`"),
+    row("maze-2d", "'''\n....", "'''\n#...", "[0.0, 4.0] #", "inside a blocked cell", "a free cell"),
+    row("maze-2d", "cell = 1.0", "cell = 0.0", "0.0\nrows", "the side of a cell is 0", "above 0"),
+    row("maze-2d", "....\n....\n....\n...*\n", "", "'''", "the drawing is empty", "`#` is blocked"),
+    row("maze-2d", "....\n....\n....\n...*", "+--+\n|  |\n+- +", " +\n'''", "` ` where a whole wall", "`+` at every corner"),
+    row("maze-2d", "....\n....\n....\n...*", "+--+\n|ab|\n+--+", "b|", "unexpected `b` inside a cell", "one mark"),
+    row("maze-2d", "....\n....\n....\n...*", "+--+\n   |\n+--+", "   |", "` ` where a wall", "`+` at every corner"),
+    row("maze-2d", "....\n....\n....\n...*", "+--+--\n|  |  \n+--+--", "+--+--\n", "not evenly spaced", "`+` at every corner"),
+    row("u-maze", "...**\n....#.##..", "...**\n....#.##.", "....#.##.\n", "row 3 has 9 characters and the first row has 10", "equally long"),
+    row("u-maze", "....#...**\n....#...**", "....#.....\n....#.....", "\"*\"", "no cell of the map is marked `*`", "mark one in the drawing"),
+    row("n-maze", "mean = [2.5, 0.5]", "mean = [3.25, 0.5]", "[3.25, 0.5]", "inside a blocked cell", "a free cell"),
+    row("n-maze", "mean = [2.5, 0.5]", "mean = [2.5, 5.5]", "5.5", "y = 5.5 is outside the bounds", "between 0 and 5"),
+    row("n-maze", "......#...", "......?...", "?...", "unknown character `?`", "`#` is blocked"),
+    row("n-maze", "hypotheses = \"track\"", "hypotheses = \"tracked\"", "\"tracked\"", "unknown value `tracked`", "`track`"),
+    row("corridor", GOAL, "in = \"#\"", "\"#\"", "this model has no map", "add a [map]"),
+    row("load-unload", "mode = \"loaded\"", "mode = \"full\"", "\"full\"", "unknown mode `full`", "`empty`"),
+    row("load-unload", "in = { x = [4.0, 5.0] }", "in = \"u\"", "\"u\"", "this model has no map", "add a [map]"),
+    row("corridor", "[world]", "[map]\ncell = 1.0\nrows = \"..\"\n[world]", "[\"x\"]", "a map has two directions", "two state variables"),
+];
+
+fn error_of(text: &str) -> ModelError {
+    model::read(text, "bad.toml").map(|_| ()).expect_err(text)
+}
+
+fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = &text[..offset];
+    let line = before.rsplit('\n').next().unwrap_or(before);
+    (before.matches('\n').count() + 1, line.chars().count() + 1)
+}
+
+#[test]
+fn every_mistake_is_shown_at_its_place_with_a_hint() {
+    let mut wrong = Vec::new();
+    for Mistake {
+        base,
+        good,
+        bad,
+        at,
+        message,
+        hint,
+    } in MISTAKES
+    {
+        let text = model::builtin(base).unwrap();
+        assert!(text.contains(good), "{base} has no {good:?}");
+        let text = text.replacen(good, bad, 1);
+        let expected = line_and_column(
+            &text,
+            text.find(at)
+                .unwrap_or_else(|| panic!("no {at:?} beside {bad:?}")),
+        );
+        let error = match model::read(&text, "bad.toml") {
+            Ok(_) => {
+                wrong.push(format!("{base}: {bad:?} is accepted"));
+                continue;
+            }
+            Err(error) => error,
+        };
+        let place = error.place.clone().unwrap();
+        if (place.line, place.column) != expected
+            || !error.message.contains(message)
+            || !error.hint.contains(hint)
+        {
+            wrong.push(format!(
+                "{base}: {bad:?}\n   expected {expected:?} {message:?} {hint:?}\n   found {error}"
+            ));
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "{} of {}:\n{}",
+        wrong.len(),
+        MISTAKES.len(),
+        wrong.join("\n")
+    );
+}
+
+#[test]
+fn an_error_names_its_file() {
+    let error = error_of("format = 1\nname = 3\n");
+    assert_eq!(
+        error.to_string(),
+        "bad.toml:2:8: unexpected number `3` (hint: write a string)"
+    );
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let error = model::find("no/such/file.toml").map(|_| ()).unwrap_err();
+    assert_eq!(error.place, None);
+    assert!(
+        error
+            .to_string()
+            .starts_with("no/such/file.toml: cannot read the file"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_misspelt_problem_brings_the_nearest_name() {
+    let error = model::find("coridor").map(|_| ()).unwrap_err();
+    assert_eq!(error.hint, "did you mean `corridor`?");
+}
+
+#[test]
+fn a_file_that_is_not_text_is_refused_at_its_first_wrong_byte() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("image.toml");
+    std::fs::write(&path, b"format = 1\nname = \"\xff\xfe\"\n").unwrap();
+    let error = model::load(&path).map(|_| ()).unwrap_err();
+    let place = error.place.clone().unwrap();
+    assert_eq!((place.line, place.column), (2, 9));
+    assert!(error.message.contains("not UTF-8"), "{error}");
+}

@@ -1,0 +1,137 @@
+//! What several tests need: models by name, models made of matrices, matrices made of arbitrary numbers.
+#![allow(dead_code)]
+
+use nalgebra::{DMatrix, DVector};
+use pilotage::model::{
+    self, Action, BeliefSettings, Episode, Interval, Model, Motion, Sensor, StartHypothesis,
+    StartShape, StateVariable, Then, WorldSpec,
+};
+
+pub fn built_in(name: &str) -> Model {
+    model::find(name).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A linear system with the belief it starts from.
+#[derive(Debug, Clone)]
+pub struct System {
+    pub a: DMatrix<f64>,
+    pub q: DMatrix<f64>,
+    pub h: DMatrix<f64>,
+    pub r: DMatrix<f64>,
+    pub mean: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+}
+
+impl System {
+    /// A model of the system with one action, `u = 0`, and levels that are only equal if their numbers are.
+    pub fn model(&self) -> Model {
+        let n = self.a.nrows();
+        let state = |i| StateVariable {
+            name: format!("x{i}"),
+            bounds: Interval::new(-10.0, 10.0),
+        };
+        Model {
+            name: "system".to_owned(),
+            about: String::new(),
+            discount: 0.9,
+            state: (0..n).map(state).collect(),
+            modes: vec![String::new()],
+            start: vec![StartHypothesis {
+                weight: 1.0,
+                mode: 0,
+                mean: self.mean.clone(),
+                covariance: self.covariance.clone(),
+                shape: StartShape::Normal,
+            }],
+            motion: Motion {
+                a: self.a.clone(),
+                b: DMatrix::identity(n, n),
+                noise: self.q.clone(),
+            },
+            sensor: Sensor {
+                h: self.h.clone(),
+                noise: self.r.clone(),
+            },
+            actions: vec![action("STAY", DVector::zeros(n))],
+            rewards: Vec::new(),
+            events: Vec::new(),
+            cost: None,
+            episode: Episode::default(),
+            belief: BeliefSettings {
+                level_tolerance: 0.0,
+                ..BeliefSettings::default()
+            },
+            map: None,
+            world: WorldSpec::default(),
+        }
+    }
+}
+
+/// An action with the model's own noise.
+pub fn action(name: &str, control: DVector<f64>) -> Action {
+    Action {
+        name: name.to_owned(),
+        control,
+        motion_noise: None,
+        sensor_noise: None,
+        then: Then::Continue,
+    }
+}
+
+/// A model of one variable: `Q`, `R` and `P_0` are numbers, `A = H = 1`.
+pub fn scalar(q: f64, r: f64, p: f64) -> System {
+    let number = |value| DMatrix::from_element(1, 1, value);
+    System {
+        a: number(1.0),
+        q: number(q),
+        h: number(1.0),
+        r: number(r),
+        mean: DVector::zeros(1),
+        covariance: number(p),
+    }
+}
+
+/// Makes matrices of numbers in `[-1, 1]`, one after the other.
+pub struct Numbers<'a>(std::iter::Cycle<std::slice::Iter<'a, f64>>);
+
+impl<'a> Numbers<'a> {
+    pub fn new(numbers: &'a [f64]) -> Self {
+        Self(numbers.iter().cycle())
+    }
+
+    pub fn matrix(&mut self, rows: usize, columns: usize) -> DMatrix<f64> {
+        DMatrix::from_iterator(rows, columns, self.0.by_ref().take(rows * columns).copied())
+    }
+
+    pub fn vector(&mut self, size: usize) -> DVector<f64> {
+        DVector::from_iterator(size, self.0.by_ref().take(size).copied())
+    }
+
+    /// A covariance of the given rank, with `floor` added to every eigenvalue.
+    pub fn covariance(&mut self, size: usize, rank: usize, floor: f64) -> DMatrix<f64> {
+        let root = self.matrix(size, rank);
+        &root * root.transpose() + DMatrix::identity(size, size) * floor
+    }
+
+    /// A system of `n` variables and `m` readings: noise of the sensor in every direction, of the motion in `rank`.
+    pub fn system(&mut self, n: usize, m: usize, rank: usize) -> System {
+        System {
+            a: self.matrix(n, n),
+            q: self.covariance(n, rank, 0.0),
+            h: self.matrix(m, n),
+            r: self.covariance(m, m, 0.1),
+            mean: self.vector(n),
+            covariance: self.covariance(n, n, 0.0),
+        }
+    }
+}
+
+/// Largest entry of a difference.
+pub fn apart(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
+    (a - b).amax()
+}
+
+/// Least eigenvalue of a symmetric matrix.
+pub fn least_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
+    matrix.clone().symmetric_eigenvalues().min()
+}
