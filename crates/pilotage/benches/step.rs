@@ -30,7 +30,7 @@ fn matrix_times_vector(bencher: Bencher) {
 const FORMS: [Matching; 2] = [Matching::Nearest, Matching::Segments];
 
 /// The corridor's own automaton.
-#[divan::bench(args = FORMS)]
+#[divan::bench(args = FORMS, sample_size = 1000)]
 fn corridor_automaton(bencher: Bencher, matching: &Matching) {
     let policy = corridor();
     let settings = compile::Settings {
@@ -42,7 +42,7 @@ fn corridor_automaton(bencher: Bencher, matching: &Matching) {
 }
 
 /// The policy it was compiled from, which looks one step ahead at every decision.
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn corridor_grid(bencher: Bencher) {
     let policy = corridor();
     let filter = policy.mdp().filter();
@@ -61,10 +61,10 @@ fn four_dimensions_200_nodes(bencher: Bencher, matching: &Matching) {
     run(bencher, &synthetic(200, *matching));
 }
 
-/// The same without nodes to speak of: what the filter takes.
-#[divan::bench]
-fn four_dimensions_1_node(bencher: Bencher) {
-    run(bencher, &synthetic(1, Matching::Nearest));
+/// The same with few nodes: one, which leaves the filter's time, and the six of the pole's automaton.
+#[divan::bench(args = [1, 6], sample_size = 1000)]
+fn four_dimensions_few_nodes(bencher: Bencher, nodes: usize) {
+    run(bencher, &synthetic(nodes, Matching::Nearest));
 }
 
 fn corridor() -> closed::GridPolicy {

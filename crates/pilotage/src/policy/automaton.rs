@@ -141,6 +141,22 @@ impl Place {
         }
     }
 
+    /// Lower corner; a point is its own.
+    pub fn lower(&self) -> &[f64] {
+        match self {
+            Self::Point(point) => point,
+            Self::Segment { lower, .. } => lower,
+        }
+    }
+
+    /// Upper corner; a point is its own.
+    pub fn upper(&self) -> &[f64] {
+        match self {
+            Self::Point(point) => point,
+            Self::Segment { upper, .. } => upper,
+        }
+    }
+
     /// Volume of a segment; 0 for a point.
     pub fn volume(&self) -> f64 {
         match self {

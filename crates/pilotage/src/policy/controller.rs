@@ -4,21 +4,24 @@ use crate::belief::{Belief, Filter};
 use crate::model::ActionId;
 use crate::policy::{Automaton, Matching, NodeId, Place, Policy};
 
+/// Nodes compared at a time, side by side in memory so that one instruction serves several.
+const LANES: usize = 8;
+
 /// Runs an automaton: keeps its belief, matches its nodes.
 #[derive(Debug, Clone)]
 pub struct Controller {
     filter: Filter,
     matching: Matching,
     levels: usize,
-    /// By mode and level: where its candidates start and end.
+    /// By mode and level: the blocks of candidates from the first up to, not including, the last.
     ranges: Vec<(usize, usize)>,
-    /// Corners of the candidates, `2 n` numbers each (a point is a box with equal corners).
-    corners: Vec<f64>,
-    volumes: Vec<f64>,
-    /// Node and action of each candidate.
+    /// Corners of the candidates in units of the scale: of a block of [`LANES`] candidates a row per variable for points, two for
+    /// segments (lower, upper). Rows are filled up with points at infinity.
+    rows: Vec<[f64; LANES]>,
+    /// Node and action of each candidate; in a block the smaller ones come first, so that they win ties.
     nodes: Vec<(NodeId, ActionId)>,
-    /// Inverse squares of the scale.
-    weights: Vec<f64>,
+    /// Inverse of the scale.
+    inverse: Vec<f64>,
     belief: Belief,
     scratch: Vec<f64>,
 }
@@ -32,40 +35,48 @@ impl Controller {
             matching: automaton.matching,
             levels,
             ranges: Vec::new(),
-            corners: Vec::new(),
-            volumes: Vec::new(),
+            rows: Vec::new(),
             nodes: Vec::new(),
-            weights: automaton
-                .scale
-                .iter()
-                .map(|scale| 1.0 / (scale * scale))
-                .collect(),
+            inverse: automaton.scale.iter().map(|scale| 1.0 / scale).collect(),
             belief: filter.initial(),
             scratch: vec![0.0; filter.states()],
             filter,
         };
         for mode in 0..automaton.modes.len() {
             for level in 0..levels {
-                let from = controller.nodes.len();
-                for id in automaton.candidates(level, mode) {
-                    controller.add(automaton, id);
+                let from = controller.nodes.len() / LANES;
+                let volume = |id: NodeId| automaton.nodes[id].place.volume();
+                let mut candidates: Vec<NodeId> = automaton.candidates(level, mode).collect();
+                candidates.sort_by(|&a, &b| volume(a).total_cmp(&volume(b)));
+                for block in candidates.chunks(LANES) {
+                    controller.add(automaton, block);
                 }
-                controller.ranges.push((from, controller.nodes.len()));
+                let to = controller.nodes.len() / LANES;
+                controller.ranges.push((from, to));
             }
         }
         controller
     }
 
-    fn add(&mut self, automaton: &Automaton, id: NodeId) {
-        let node = &automaton.nodes[id];
-        let (lower, upper) = match &node.place {
-            Place::Point(point) => (point, point),
-            Place::Segment { lower, upper, .. } => (lower, upper),
+    fn add(&mut self, automaton: &Automaton, block: &[NodeId]) {
+        let nodes = || block.iter().map(|&id| (id, &automaton.nodes[id]));
+        let mut row = |corner: &dyn Fn(&Place) -> f64| {
+            let mut row = [f64::INFINITY; LANES];
+            for (lane, (_, node)) in row.iter_mut().zip(nodes()) {
+                *lane = corner(&node.place);
+            }
+            self.rows.push(row);
         };
-        self.corners.extend(lower);
-        self.corners.extend(upper);
-        self.volumes.push(node.place.volume());
-        self.nodes.push((id, node.action));
+        for (i, inverse) in self.inverse.iter().enumerate() {
+            let (lower, upper) = (Place::lower, Place::upper);
+            row(&|place| lower(place)[i] * inverse);
+            if self.matching == Matching::Segments {
+                row(&|place| upper(place)[i] * inverse);
+            }
+        }
+        let padding = std::iter::repeat_n((0, 0), LANES - block.len());
+        self.nodes
+            .extend(nodes().map(|(id, node)| (id, node.action)).chain(padding));
     }
 
     /// The belief.
@@ -99,53 +110,64 @@ impl Controller {
             return (0, 0);
         }
         let best = match self.matching {
-            Matching::Nearest => self.nearest(from, to, &belief.mean),
-            Matching::Segments => self.segment(from, to, &belief.mean),
+            Matching::Nearest => {
+                self.closest::<1>(from, to, &belief.mean, |[point], at| point - at)
+            }
+            Matching::Segments => {
+                self.closest::<2>(from, to, &belief.mean, |[lower, upper], at| {
+                    // `f64::max` would also look after NaN, of which there is none.
+                    let (below, above) = (lower - at, at - upper);
+                    let outside = if below > above { below } else { above };
+                    if outside > 0.0 { outside } else { 0.0 }
+                })
+            }
         };
         self.nodes[best]
     }
 
-    fn nearest(&self, from: usize, to: usize, mean: &[f64]) -> usize {
-        let n = mean.len();
-        let mut best = (from, f64::INFINITY);
-        for (k, corners) in self.corners[2 * n * from..2 * n * to]
-            .chunks_exact(2 * n)
-            .enumerate()
-        {
-            let distance = corners[..n]
-                .iter()
-                .zip(mean)
-                .zip(&self.weights)
-                .map(|((x, m), w)| w * (m - x) * (m - x))
-                .sum();
-            if distance < best.1 {
-                best = (from + k, distance);
+    /// The first of the candidates in blocks `from..to` that are closest to a mean. `apart` gives the distance along one variable
+    /// from that variable's `ROWS` rows.
+    fn closest<const ROWS: usize>(
+        &self,
+        from: usize,
+        to: usize,
+        mean: &[f64],
+        apart: impl Fn([f64; ROWS], f64) -> f64,
+    ) -> usize {
+        let height = ROWS * mean.len();
+        let blocks = self.rows[from * height..to * height].chunks_exact(height);
+        let mut closest = (f64::INFINITY, from * LANES);
+        for (block, rows) in blocks.enumerate() {
+            let mut distance = [0.0; LANES];
+            for ((rows, m), inverse) in rows.chunks_exact(ROWS).zip(mean).zip(&self.inverse) {
+                let at = m * inverse;
+                for (lane, distance) in distance.iter_mut().enumerate() {
+                    let apart = apart(std::array::from_fn(|row| rows[row][lane]), at);
+                    *distance += apart * apart;
+                }
+            }
+            // Few blocks hold a closer one, so which it is can be asked afterwards.
+            let least = least(distance);
+            if least < closest.0 {
+                let lane = distance.iter().position(|&distance| distance == least);
+                closest = (least, (from + block) * LANES + lane.unwrap_or(0));
             }
         }
-        best.0
+        closest.1
     }
+}
 
-    fn segment(&self, from: usize, to: usize, mean: &[f64]) -> usize {
-        let n = mean.len();
-        let mut best = (from, f64::INFINITY, f64::INFINITY);
-        for (k, corners) in self.corners[2 * n * from..2 * n * to]
-            .chunks_exact(2 * n)
-            .enumerate()
-        {
-            let mut distance = 0.0;
-            for i in 0..n {
-                let apart = (corners[i] - mean[i])
-                    .max(mean[i] - corners[n + i])
-                    .max(0.0);
-                distance += self.weights[i] * apart * apart;
-            }
-            let volume = self.volumes[from + k];
-            if distance < best.1 || (distance == best.1 && volume < best.2) {
-                best = (from + k, distance, volume);
-            }
+/// The least of the lanes, found by halves.
+fn least(mut lanes: [f64; LANES]) -> f64 {
+    let mut half = LANES / 2;
+    while half > 0 {
+        for lane in 0..half {
+            let (a, b) = (lanes[lane], lanes[lane + half]);
+            lanes[lane] = if a < b { a } else { b };
         }
-        best.0
+        half /= 2;
     }
+    lanes[0]
 }
 
 impl Policy for Controller {
