@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use clap::Args;
+use pilotage::Error;
 use pilotage::belief::BeliefMdp;
 use pilotage::model;
 use pilotage::solve::SolverKind;
@@ -117,7 +118,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     for solver in SolverKind::ALL {
         match solver.accepts(&model) {
             Ok(()) => writeln!(out, "  {:<12} can solve it", solver.name())?,
-            Err(reason) => writeln!(out, "  {:<12} cannot: {reason}", solver.name())?,
+            Err(Error::Unsupported { reason, .. }) => {
+                writeln!(out, "  {:<12} cannot: {reason}", solver.name())?;
+            }
+            Err(error) => writeln!(out, "  {:<12} cannot: {error}", solver.name())?,
         }
     }
     Ok(())

@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             model.about.clone(),
         ]);
     }
-    writeln!(out, "{table}\n")?;
+    writeln!(out, "{}\n", table.trim_fmt())?;
     let solvers: Vec<_> = SolverKind::ALL.iter().map(|solver| solver.name()).collect();
     writeln!(out, "solvers: {}", solvers.join(", "))?;
     Ok(())

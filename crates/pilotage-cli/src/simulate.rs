@@ -52,17 +52,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let seconds = clock.elapsed().as_secs_f64();
     let mut out = std::io::stdout().lock();
     if arguments.json {
-        let report = json!({
-            "pilotage": env!("CARGO_PKG_VERSION"),
-            "problem": model.name,
-            "solver": automaton.solver,
-            "policy": automaton.matching,
-            "seed": arguments.evaluation.seed,
-            "nodes": automaton.nodes.len(),
-            "planned_value": automaton.planned_value,
-            "evaluation": evaluation,
-            "seconds": { "evaluate": seconds },
-        });
+        let mut report = identity(&automaton, arguments.evaluation.seed);
+        report["planned_value"] = json!(automaton.planned_value);
+        report["evaluation"] = json!(evaluation);
+        report["seconds"] = json!({ "evaluate": seconds });
         writeln!(out, "{report}")?;
     } else {
         writeln!(
@@ -95,16 +88,9 @@ fn wake_up(
     let result = measure(&BeliefMdp::new(model), &policy, &settings, bars)?;
     let mut out = std::io::stdout().lock();
     if arguments.json {
-        let report = json!({
-            "pilotage": env!("CARGO_PKG_VERSION"),
-            "problem": model.name,
-            "solver": automaton.solver,
-            "policy": automaton.matching,
-            "seed": settings.seed,
-            "nodes": automaton.nodes.len(),
-            "wake_up": result,
-            "seconds": { "evaluate": clock.elapsed().as_secs_f64() },
-        });
+        let mut report = identity(automaton, settings.seed);
+        report["wake_up"] = json!(result);
+        report["seconds"] = json!({ "evaluate": clock.elapsed().as_secs_f64() });
         writeln!(out, "{report}")?;
         return Ok(());
     }
@@ -148,6 +134,18 @@ fn wake_up(
         share(result.never_alone, result.episodes)
     )?;
     Ok(())
+}
+
+/// What every report begins with.
+fn identity(automaton: &Automaton, seed: u64) -> serde_json::Value {
+    json!({
+        "pilotage": env!("CARGO_PKG_VERSION"),
+        "problem": automaton.problem,
+        "solver": automaton.solver,
+        "policy": automaton.matching,
+        "seed": seed,
+        "nodes": automaton.nodes.len(),
+    })
 }
 
 fn share(count: usize, of: usize) -> f64 {

@@ -101,7 +101,7 @@ pub fn nodes(automaton: &Automaton) -> String {
     } else {
         String::new()
     };
-    format!("{table}{more}")
+    format!("{}{more}", table.trim_fmt())
 }
 
 fn levels((first, last): (usize, usize)) -> String {

@@ -133,25 +133,8 @@ impl Model {
         let path = Path::new("actions");
         for action in &self.actions {
             let path = path.clone().key(&action.name);
-            let controls = format!(
-                "there are {} controls, the columns of B",
-                self.motion.b.ncols()
-            );
-            vector(
-                &action.control,
-                self.motion.b.ncols(),
-                &controls,
-                path.clone().key("u"),
-            )?;
-            if let Some(noise) = &action.motion_noise {
-                let variables = format!("there are {} state variables", self.state_dim());
-                covariance(
-                    noise,
-                    self.state_dim(),
-                    &variables,
-                    path.clone().key("noise"),
-                )?;
-            }
+            self.check_control(&action.control, &path)?;
+            self.check_motion_noise(action.motion_noise.as_ref(), &path)?;
             if let Some(noise) = &action.sensor_noise {
                 covariance(
                     noise,
@@ -384,6 +367,25 @@ impl Model {
         }
     }
 
+    fn check_control(&self, control: &DVector<f64>, path: &Path) -> Result<(), Fault> {
+        let controls = self.motion.b.ncols();
+        let expected = format!("there are {controls} controls, the columns of B");
+        vector(control, controls, &expected, path.clone().key("u"))
+    }
+
+    fn check_motion_noise(&self, noise: Option<&DMatrix<f64>>, path: &Path) -> Result<(), Fault> {
+        let Some(noise) = noise else {
+            return Ok(());
+        };
+        let variables = format!("there are {} state variables", self.state_dim());
+        covariance(
+            noise,
+            self.state_dim(),
+            &variables,
+            path.clone().key("noise"),
+        )
+    }
+
     fn check_world_motion(&self, path: &Path) -> Result<(), Fault> {
         let motion = &self.world.motion;
         if *motion == WorldMotion::default() {
@@ -396,28 +398,11 @@ impl Model {
                 "delete this table, or `kind`",
             ));
         }
-        if let Some(noise) = &motion.noise {
-            let variables = format!("there are {} state variables", self.state_dim());
-            covariance(
-                noise,
-                self.state_dim(),
-                &variables,
-                path.clone().key("noise"),
-            )?;
-        }
-        let controls = format!(
-            "there are {} controls, the columns of B",
-            self.motion.b.ncols()
-        );
+        self.check_motion_noise(motion.noise.as_ref(), path)?;
         for (i, entry) in motion.controls.iter().enumerate() {
             let path = path.clone().key("control").index(i);
             self.check_condition(&entry.actions, entry.mode, &Region::everywhere(), &path)?;
-            vector(
-                &entry.control,
-                self.motion.b.ncols(),
-                &controls,
-                path.key("u"),
-            )?;
+            self.check_control(&entry.control, &path)?;
         }
         Ok(())
     }

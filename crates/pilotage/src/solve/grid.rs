@@ -6,6 +6,30 @@ use crate::belief::gaussian::normal_density;
 use crate::belief::kalman::square_root;
 use crate::model::Interval;
 
+/// Settings of value iteration on a grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Points of the grid along each variable, at least 2; `None` for the default of the number of variables.
+    pub points: Option<usize>,
+    /// Largest error of the fixed point, in units of reward, above 0.
+    pub tolerance: f64,
+    /// Most sweeps, over one group of levels where there are levels; at least 1.
+    pub sweeps: usize,
+    /// Most memory for the grid, MiB.
+    pub memory: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            points: None,
+            tolerance: 1e-7,
+            sweeps: 20_000,
+            memory: 1024,
+        }
+    }
+}
+
 /// Evenly spaced points along one variable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {

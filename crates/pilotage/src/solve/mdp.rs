@@ -9,6 +9,7 @@
 
 use nalgebra::DVector;
 
+pub use super::grid::Settings;
 use super::grid::{Axis, Grid, Interpolation, Smoother};
 use super::kbvi::branches::first_best;
 use crate::belief::BeliefMdp;
@@ -16,30 +17,6 @@ use crate::error::{Error, Result};
 use crate::model::{ActionId, HypothesisBelief, ModeId, Model, Then, WallBelief};
 use crate::observe::Observer;
 use crate::parallel;
-
-/// Settings of value iteration on true states.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Points of the grid along each variable, at least 2; `None` for the default of the number of variables.
-    pub points: Option<usize>,
-    /// Largest error of the fixed point, in units of reward, above 0.
-    pub tolerance: f64,
-    /// Most sweeps, at least 1.
-    pub sweeps: usize,
-    /// Most memory for the grid, MiB.
-    pub memory: u64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            points: None,
-            tolerance: 1e-6,
-            sweeps: 20_000,
-            memory: 1024,
-        }
-    }
-}
 
 /// Most state variables for which a grid of true states is fine enough to be of use.
 pub const MOST_VARIABLES: usize = 3;

@@ -11,7 +11,7 @@ use crate::belief::BeliefMdp;
 use crate::error::Result;
 use crate::model::Model;
 use crate::observe::Observer;
-use crate::policy::{Controller, Policy};
+use crate::policy::{Automaton, Controller, Policy};
 
 /// Settings of all solvers; each takes what concerns it.
 #[derive(Debug, Clone, PartialEq)]
@@ -192,14 +192,7 @@ fn nearest_action(mdp: &BeliefMdp, settings: &SolveSettings) -> Result<Solution>
     };
     let compiler = settings.compiler();
     compile::annotate(&mut automaton, mdp, compiler.episodes, compiler.seed);
-    Ok(Solution {
-        policy: Solved::Automaton(automaton),
-        planned_value: None,
-        policy_convergence_horizon: None,
-        levels: mdp.levels().len(),
-        samples: None,
-        converged: true,
-    })
+    Ok(searched(mdp, automaton))
 }
 
 /// Too many variables for a grid, and limits to stay within: nodes on either side of planes, which are the planner itself.
@@ -214,14 +207,19 @@ fn planes(mdp: &BeliefMdp, settings: &SolveSettings, observer: &dyn Observer) ->
         let policy = Controller::new(&automaton);
         return planned(SolverKind::KbviClosed, mdp, policy, true, settings);
     }
-    Ok(Solution {
+    Ok(searched(mdp, automaton))
+}
+
+/// An automaton that was not planned on a grid, so that what it is worth is not known.
+fn searched(mdp: &BeliefMdp, automaton: Automaton) -> Solution {
+    Solution {
         policy: Solved::Automaton(automaton),
         planned_value: None,
         policy_convergence_horizon: None,
         levels: mdp.levels().len(),
         samples: None,
         converged: true,
-    })
+    }
 }
 
 /// A planner's policy in the form asked for.

@@ -23,32 +23,9 @@ use crate::error::{Error, Result};
 use crate::model::{ActionId, Then};
 use crate::observe::Observer;
 use crate::policy::Policy;
+pub use crate::solve::grid::Settings;
 use crate::solve::grid::{Grid, Interpolation, Smoother};
 use crate::solve::walled::WalledSmoother;
-
-/// Settings of closed-loop KBVI.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Points of the grid along each variable, at least 2; `None` for the default of the number of variables.
-    pub points: Option<usize>,
-    /// Largest error of the fixed point, in units of reward, above 0.
-    pub tolerance: f64,
-    /// Most sweeps over one group of levels, at least 1.
-    pub sweeps: usize,
-    /// Most memory for the grid, MiB.
-    pub memory: u64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            points: None,
-            tolerance: 1e-7,
-            sweeps: 20_000,
-            memory: 1024,
-        }
-    }
-}
 
 /// The value on the grid, and the policy that looks one step ahead from any belief.
 #[derive(Debug)]

@@ -6,11 +6,12 @@
 use super::branches::{Branches, first_best};
 use crate::belief::{Belief, BeliefMdp};
 use crate::error::{Error, Result};
-use crate::model::{ActionId, When};
+use crate::model::ActionId;
 use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::{Automaton, Matching, Policy};
 use crate::simulate::{FilterAgent, run_episode};
+use crate::solve::SolverKind;
 use crate::solve::compile::annotate;
 use crate::world::{Draws, ProblemWorld};
 
@@ -91,7 +92,7 @@ pub fn generate(
             });
         }
     }
-    check_model(mdp)?;
+    SolverKind::Kbvi.accepts(mdp.model())?;
     let planner = Branches::new(mdp.clone(), settings.search);
     let mut history: Vec<(usize, usize)> = Vec::new();
     let mut automaton = Automaton::new(mdp, "kbvi", settings.matching);
@@ -115,22 +116,6 @@ pub fn generate(
 }
 
 /// The branches' formulas are for rewards `r(s, a)`.
-fn check_model(mdp: &BeliefMdp) -> Result<()> {
-    let model = mdp.model();
-    let rewards = model.rewards.iter().map(|reward| reward.when);
-    let mut all = rewards.chain(model.events.iter().map(|event| event.when));
-    if all.any(|when| when == When::After) {
-        return Err(Error::Unsupported {
-            solver: "kbvi",
-            model: model.name.clone(),
-            reason: "it pays for, or reacts to, where an action leads (`when = \"after\"`), and the branches' formulas are for \
-                     where it is taken; use kbvi-closed"
-                .to_owned(),
-        });
-    }
-    Ok(())
-}
-
 /// Whether the number of nodes has stayed the same over the last `repeats` horizons.
 fn settled(history: &[(usize, usize)], repeats: usize) -> bool {
     history.len() > repeats
