@@ -2,8 +2,9 @@
 //!
 //! A branch of the tree is a sequence of actions fixed in advance. Its worth is the discounted sum of expected rewards over the
 //! beliefs that may be held at each step. Branches are cut where the mean leaves the world (the thesis' pruning), where even the
-//! largest reward at every later step could not make up for what is missing (branch and bound), and where the same expected belief
-//! was reached before with more in hand.
+//! largest reward at every later step could not make up for what is missing (branch and bound). What follows an expected belief
+//! does not depend on how it was reached, so it is searched once and remembered: where actions commute, as in a maze, the search
+//! grows with the places within reach and no longer with the number of sequences.
 
 use std::collections::HashMap;
 
@@ -141,10 +142,18 @@ struct Search<'a> {
     leads_to: HashMap<(OutlookId, ClassId), OutlookId>,
     /// Actions by mode: the first action that earns the same rewards everywhere.
     earns_like: Vec<Vec<ActionId>>,
-    /// The best whole branch so far.
-    best: f64,
-    /// The most that was in hand when an expected belief was reached.
-    reached: HashMap<(usize, ModeId, OutlookId, Vec<i64>), f64>,
+    /// What the steps from an expected belief on can collect.
+    known: HashMap<Key, Worth>,
+}
+
+/// Step, mode, outlook and mean, in bits, of an expected belief.
+type Key = (usize, ModeId, OutlookId, Vec<u64>);
+
+/// What the best branch from an expected belief collects.
+#[derive(Debug, Clone, Copy)]
+enum Worth {
+    Exactly(f64),
+    AtMost(f64),
 }
 
 impl<'a> Search<'a> {
@@ -195,19 +204,15 @@ impl<'a> Search<'a> {
                         .collect()
                 })
                 .collect(),
-            best: f64::NEG_INFINITY,
-            reached: HashMap::new(),
+            known: HashMap::new(),
         }
     }
 
     /// What the best branch that begins with the action collects.
     fn best_branch_from(&mut self, belief: &Belief, action: ActionId) -> f64 {
-        self.best = f64::NEG_INFINITY;
-        self.reached.clear();
         let root = self.root(belief);
         let reward = self.reward(&root, action);
-        self.take(&root, action, reward, 0, 0.0);
-        self.best
+        self.take(&root, action, reward, 0, f64::NEG_INFINITY)
     }
 
     fn root(&mut self, belief: &Belief) -> Expected {
@@ -237,39 +242,54 @@ impl<'a> Search<'a> {
         )
     }
 
-    /// Takes an action, whose reward here is known, for one group of steps from step `time`, with `in_hand` collected before.
-    fn take(&mut self, from: &Expected, action: ActionId, reward: f64, time: usize, in_hand: f64) {
+    /// What the best branch collects that takes an action, whose reward here is known, for one group of steps from step `time`.
+    /// Where that is no more than `floor`, any number between the two will do.
+    fn take(
+        &mut self,
+        from: &Expected,
+        action: ActionId,
+        reward: f64,
+        time: usize,
+        floor: f64,
+    ) -> f64 {
         let mut at = from.clone();
-        let mut in_hand = in_hand + self.weights[time] * reward;
+        let mut collected = self.weights[time] * reward;
         let end = (time + self.settings.group).min(self.settings.horizon + 1);
         for t in time..end {
             if t > time {
-                in_hand += self.weights[t] * self.reward(&at, action);
+                collected += self.weights[t] * self.reward(&at, action);
             }
             match self.advance(&mut at, action) {
                 Then::Continue if self.fails(&at) => {
                     let paid = self.mdp.model().episode.failure_reward;
-                    return self.finish(in_hand + self.weights[t] * paid);
+                    return collected + self.weights[t] * paid;
                 }
                 Then::Continue => {}
-                Then::End => return self.finish(in_hand),
+                Then::End => return collected,
                 Then::Restart => at = self.root(self.mdp.start()),
             }
         }
         if end > self.settings.horizon {
-            return self.finish(in_hand);
+            return collected;
         }
-        self.descend(&at, end, in_hand);
+        collected + self.descend(&at, end, floor - collected)
     }
 
-    fn descend(&mut self, at: &Expected, time: usize, in_hand: f64) {
+    /// What the best branch from an expected belief collects; where that is no more than `floor`, any number between the two.
+    fn descend(&mut self, at: &Expected, time: usize, floor: f64) -> f64 {
         let (least, most) = self.bounds[time];
-        if in_hand + most <= self.best || self.was_reached_with_more(at, time, in_hand) {
-            return;
+        if most <= floor {
+            return most;
         }
         if !self.within_reach(at) {
             // Not worth a look, and no way out of costs: it counts for the least it can earn.
-            return self.finish(in_hand + least);
+            return least;
+        }
+        let key = key(at, time);
+        match self.known.get(&key) {
+            Some(&Worth::Exactly(value)) => return value,
+            Some(&Worth::AtMost(value)) if value <= floor => return value,
+            _ => {}
         }
         let mut promising: Vec<(f64, ActionId)> = Vec::with_capacity(self.displacements.len());
         for action in 0..self.displacements.len() {
@@ -282,13 +302,17 @@ impl<'a> Search<'a> {
             promising.push((reward, action));
         }
         promising.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut best = f64::NEG_INFINITY;
         for (reward, action) in promising {
-            self.take(at, action, reward, time, in_hand);
+            best = best.max(self.take(at, action, reward, time, floor.max(best)));
         }
-    }
-
-    fn finish(&mut self, collected: f64) {
-        self.best = self.best.max(collected);
+        let worth = if best > floor {
+            Worth::Exactly(best)
+        } else {
+            Worth::AtMost(best)
+        };
+        self.known.insert(key, worth);
+        best
     }
 
     /// Moves the expected belief on by one step (Eq. 5.3 and 5.5); the mode follows the event that the expected mean calls for.
@@ -345,22 +369,6 @@ impl<'a> Search<'a> {
         id
     }
 
-    fn was_reached_with_more(&mut self, at: &Expected, time: usize, in_hand: f64) -> bool {
-        // Sums of the same displacements in another order differ in the last digits.
-        let mean = at
-            .mean
-            .iter()
-            .map(|value| (value * 1e9).round() as i64)
-            .collect();
-        let known = self
-            .reached
-            .entry((time, at.mode, at.outlook, mean))
-            .or_insert(f64::NEG_INFINITY);
-        let more = *known >= in_hand;
-        *known = known.max(in_hand);
-        more
-    }
-
     /// Whether the expected mean is where the agent fails: a branch is over there.
     fn fails(&self, at: &Expected) -> bool {
         !self.mdp.model().episode.alive.contains(at.mean.as_slice())
@@ -380,4 +388,10 @@ impl<'a> Search<'a> {
         };
         (0..at.mean.len()).all(inside)
     }
+}
+
+fn key(at: &Expected, time: usize) -> Key {
+    // To the bit: without noise the last digit decides on which side of a border a mean lies.
+    let bits = at.mean.iter().map(|value| value.to_bits());
+    (time, at.mode, at.outlook, bits.collect())
 }
