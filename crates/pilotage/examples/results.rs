@@ -119,11 +119,11 @@ fn beside_table_6_1(earned: &[Row]) {
     }
     println!(
         "\nWhat differs, and why:\n\n\
-         - *Tiger, segments.* The thesis' 13 listens before a door fit 0.625 read as a standard deviation, and read so the ramp formula earns its 6.92 undiscounted.\n\
+         - *Tiger, segments.* The thesis' 13 listens before a door fit 0.625 read as a standard deviation, and read so the ramp formula comes within 0.04 of its 6.92, undiscounted.\n\
          - *Tiger, 1-NN.* The thesis finds segments clearly better than 1-NN (6.92 to 5.89). Here the two forms of one plan differ by no more than 0.1, and 1-NN is never the worse one by more than its error: a gap of 1 must come from elsewhere.\n\
          - *1D maze, segments.* A reward of 0.93 a step is only earned by pushing EAST against the wall; discounted, the maze is worth 0.83 without walls. The thesis does not say which it counted.\n\
          - *1D maze, 1-NN.* 0.47 is what a step earns without walls, with either form.\n\
-         - *Printed 5.14* integrates the reward over the wrong variable; plans made with it earn least on every problem above."
+         - *Printed 5.14* divides a term by sqrt(2 pi V) that should stand alone; plans made with it earn least, but for the corridor with walls, where its mistake pushes the robot against the paying wall."
     );
 }
 

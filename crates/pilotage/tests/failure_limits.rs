@@ -136,7 +136,7 @@ fn pole(name: &str, effort: f64) -> (Model, BeliefMdp, quadratic::Settings) {
 }
 
 /// The belief's own probability of failing foretells the mean life in the linear world: 20 runs of 30,000 steps see about 15
-/// failures, whose count is within a factor 2.5 of what is foretold with more than 99.9% probability.
+/// failures, whose count is within a factor 2.5 of its expectation with more than 99% probability.
 #[test]
 fn hazard_foretells_life() {
     let (mut model, _, settings) = pole("cart-pole-noisy", 0.02);

@@ -2,6 +2,7 @@
 
 use super::kbvi::quadratic;
 use super::{lqg, mdp};
+use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
 use crate::model::{Interval, Model, When, suggest};
 
@@ -73,7 +74,9 @@ impl SolverKind {
     pub fn accepts(self, model: &Model) -> Result<()> {
         let reason = match self {
             Self::Kbvi => reward_missing(model).or_else(|| pays_afterwards(model)),
-            Self::KbviClosed if quadratic::suits(model) => None,
+            Self::KbviClosed if quadratic::suits(model) => {
+                quadratic::refusal(&BeliefMdp::new(model))
+            }
             Self::KbviClosed => reward_missing(model).or_else(|| bound_missing(model)),
             Self::Lqg => lqg::use_of(model).err(),
             Self::Qmdp | Self::Mls => reward_missing(model)

@@ -333,31 +333,38 @@ fn check(mdp: &BeliefMdp, settings: &Settings) -> Result<()> {
             });
         }
     }
+    match refusal(mdp) {
+        None => Ok(()),
+        Some(reason) => Err(Error::Unsupported {
+            solver: SOLVER,
+            model: mdp.model().name.clone(),
+            reason,
+        }),
+    }
+}
+
+/// Why a model cannot be planned for, and what would do.
+pub fn refusal(mdp: &BeliefMdp) -> Option<String> {
     let model = mdp.model();
     let sides = &model.episode.alive.sides;
-    let reason = if sides.is_empty() {
-        format!(
+    if sides.is_empty() {
+        Some(format!(
             "it has {} state variables, too many for a grid, and no failure limits to plan by; state it in at most {GRID_VARIABLES} variables, or add `alive` to [episode]",
             model.state_dim()
-        )
+        ))
     } else if let Some((i, side)) = sides
         .iter()
         .find(|(_, side)| !(side.low < 0.0 && 0.0 < side.high))
     {
-        format!(
+        Some(format!(
             "0 is not within the failure limits [{}, {}] of `{}`, and the planner steers there; measure the variable from a point within its limits",
             side.low, side.high, model.state[*i].name
-        )
+        ))
     } else if model.modes.len() > 1 || !mdp.is_gaussian() {
-        "a quadratic value knows nothing of modes, walls or hypotheses; state the problem without them, or in at most 3 variables".to_owned()
+        Some("a quadratic value knows nothing of modes, walls or hypotheses; state the problem without them, or in at most 3 variables".to_owned())
     } else if mdp.levels().classes().len() > 1 {
-        "its actions differ in their noise, so that its levels are no chain; give all actions the same noise".to_owned()
+        Some("its actions differ in their noise, so that its levels are no chain; give all actions the same noise".to_owned())
     } else {
-        return Ok(());
-    };
-    Err(Error::Unsupported {
-        solver: SOLVER,
-        model: model.name.clone(),
-        reason,
-    })
+        None
+    }
 }
