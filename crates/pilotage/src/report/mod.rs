@@ -8,6 +8,7 @@ mod automaton;
 mod axes;
 mod belief_map;
 mod curve;
+mod finding;
 mod layout;
 mod palette;
 mod plot;
@@ -20,6 +21,9 @@ mod tests;
 pub use automaton::automaton_svg;
 pub use belief_map::belief_map_svg;
 pub use curve::{Series, curves_svg};
+pub use finding::{
+    Algorithm, Figure, Finding, Frame, Hypothesis, Recording, Report, Table, Verdict,
+};
 
 use crate::policy::Place;
 
