@@ -22,6 +22,13 @@ impl Bars {
     }
 }
 
+impl Bars {
+    /// Says which part of a long run is being made.
+    pub fn chapter(&self, name: &str, done: usize, of: usize) {
+        self.note(&format!("{:>3} of {of}: {name}", done + 1));
+    }
+}
+
 impl Observer for Bars {
     fn progress(&self, stage: &'static str, done: u64, total: u64) {
         if self.quiet {

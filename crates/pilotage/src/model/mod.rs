@@ -23,8 +23,7 @@ use serde::{Deserialize, Serialize};
 
 pub use barriers::Barriers;
 pub use builtin::{builtin, find, names};
-pub(crate) use error::suggest;
-pub use error::{Fault, ModelError, Path, Place, Step};
+pub use error::{Fault, ModelError, Path, Place, Step, suggest};
 pub use file::schema;
 pub use map::Map;
 pub use read::{load, read};
