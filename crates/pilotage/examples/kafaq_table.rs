@@ -105,7 +105,7 @@ impl Run {
             "nodes": self.learned.automaton.nodes.len(),
             "converged": self.learned.converged,
             "samples": self.learned.samples,
-            "memory": self.learned.memory,
+            "memory": self.learned.learning.memory,
             "seconds": self.seconds,
         })
     }
@@ -332,7 +332,7 @@ fn print_row(name: &str, runs: &[Run], yardstick: Option<&Evaluation>) {
 
 fn print_automaton(learned: &Learned) {
     let automaton: &Automaton = &learned.automaton;
-    println!("  {}", learned.memory);
+    println!("  {}", learned.learning.memory);
     for node in &automaton.nodes {
         if let Place::Segment { lower, upper, .. } = &node.place {
             println!(

@@ -154,7 +154,7 @@ fn a_run_is_its_seed() {
     let model = model("cart-load-unload");
     let [first, again, other] = [3, 3, 4].map(|seed| learn(&model, &hurried(seed)));
     assert_eq!(first, again);
-    assert_ne!(first.curve, other.curve);
+    assert_ne!(first.learning.curve, other.learning.curve);
 }
 
 /// The learner is told another model's rewards, events and modes than those of the world it acts in, and does not care.
@@ -167,7 +167,7 @@ fn rewards_and_map_are_learned_and_not_read() {
     told.modes = vec![String::new()];
     let honest = learn_in(&world, &world, &hurried(1), None).unwrap();
     let misled = learn_in(&world, &told, &hurried(1), None).unwrap();
-    assert_eq!(honest.curve, misled.curve);
+    assert_eq!(honest.learning.curve, misled.learning.curve);
     assert_eq!(places(&honest.automaton), places(&misled.automaton));
 }
 

@@ -9,6 +9,7 @@ mod axes;
 mod belief_map;
 mod curve;
 mod layout;
+mod learning;
 mod palette;
 mod plot;
 mod sheet;
@@ -20,6 +21,7 @@ mod tests;
 pub use automaton::automaton_svg;
 pub use belief_map::belief_map_svg;
 pub use curve::{Series, curves_svg};
+pub use learning::{returns_svg, values_svg};
 
 use crate::policy::Place;
 

@@ -1,7 +1,7 @@
 //! The solvers by name: which there are, and what each accepts.
 
 use super::kbvi::quadratic;
-use super::{lqg, mdp};
+use super::{kafaq, lqg, mdp};
 use crate::error::{Error, Result};
 use crate::model::{Interval, Model, When, suggest};
 
@@ -19,16 +19,19 @@ pub enum SolverKind {
     Qmdp,
     /// Most likely state (Nourbakhsh, Powers and Birchfield, 1995).
     Mls,
+    /// KAFAQ-learning (thesis chapter 4).
+    Kafaq,
 }
 
 impl SolverKind {
     /// All solvers.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::KbviClosed,
         Self::Kbvi,
         Self::Lqg,
         Self::Qmdp,
         Self::Mls,
+        Self::Kafaq,
     ];
 
     /// Its name, as on the command line.
@@ -39,6 +42,7 @@ impl SolverKind {
             Self::Lqg => "lqg",
             Self::Qmdp => "qmdp",
             Self::Mls => "mls",
+            Self::Kafaq => "kafaq",
         }
     }
 
@@ -50,6 +54,7 @@ impl SolverKind {
             Self::Lqg => "linear feedback on the mean, for quadratic cost or the nearest action",
             Self::Qmdp => "acts as if all uncertainty were gone after this step",
             Self::Mls => "acts as if the most likely state were certain",
+            Self::Kafaq => "learns regions of belief by trial, told neither map nor rewards",
         }
     }
 
@@ -66,7 +71,12 @@ impl SolverKind {
         })
     }
 
-    /// Whether it is made for such a model.
+    /// Whether it learns from experience, rather than plan from the model.
+    pub fn learns(self) -> bool {
+        self == Self::Kafaq
+    }
+
+    /// Whether it is made for such a model, with its default settings.
     ///
     /// # Errors
     /// [`Error::Unsupported`] with the reason, and what would do.
@@ -80,6 +90,7 @@ impl SolverKind {
                 .or_else(|| pays_afterwards(model))
                 .or_else(|| bound_missing(model))
                 .or_else(|| too_many_variables(model)),
+            Self::Kafaq => return kafaq::accepts(model, &kafaq::Settings::default()),
         };
         match reason {
             None => Ok(()),

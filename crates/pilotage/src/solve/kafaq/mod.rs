@@ -46,7 +46,7 @@ use crate::model::{ActionId, Model};
 use crate::observe::Observer;
 use crate::policy::Automaton;
 use crate::random::{Rng, Role, stream};
-use crate::world::Draws;
+use crate::world::{Draws, ProblemWorld, World};
 use draft::Draft;
 use evidence::critical;
 use memory::{Kind, Memory};
@@ -62,9 +62,18 @@ pub struct Learned {
     pub converged: bool,
     /// Steps of experience, trials included.
     pub samples: u64,
-    /// What it remembers, in words.
+    /// How it came about.
+    pub learning: Learning,
+}
+
+/// How learning went.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Learning {
+    /// What the automaton remembers, in words.
     pub memory: String,
-    /// How learning went, epoch by epoch.
+    /// Number of that memory among those tried, see [`Point::memory`].
+    pub adopted: usize,
+    /// Epoch by epoch.
     pub curve: Vec<Point>,
 }
 
@@ -96,6 +105,15 @@ pub struct RegionValue {
     pub value: f64,
 }
 
+/// Whether a model can be learned with these settings.
+///
+/// # Errors
+/// [`crate::Error::Setting`] and [`crate::Error::Unsupported`], as [`learn`].
+pub fn accepts(model: &Model, settings: &Settings) -> Result<()> {
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+    Task::new(model, settings.clone(), &worlds).map(drop)
+}
+
 /// Learns an automaton in the worlds that `worlds` makes, of which `model` tells no more than the agent knows of itself.
 ///
 /// With a checkpoint file the run writes its state there after every epoch, and goes on from there if the file exists: stopped and
@@ -119,7 +137,12 @@ pub fn learn(
     }
     let mut run = match checkpoint.filter(|path| path.exists()) {
         Some(path) => Run::resume(model, worlds, settings, path)?,
-        None => Run::new(model, worlds, settings)?,
+        None => {
+            let run = Run::new(model, worlds, settings)?;
+            // A file that cannot be written is known before work is done that it should keep.
+            checkpoint.map_or(Ok(()), |path| run.save(path))?;
+            run
+        }
     };
     while !run.finished() {
         run.advance(observer);
@@ -151,6 +174,8 @@ struct State {
 /// The best automaton so far and what it was made of.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Best {
+    /// Number of its memory.
+    memory: usize,
     draft: Draft,
     steady: Steady,
     converged: bool,
@@ -226,8 +251,8 @@ impl<'a> Run<'a> {
             self.task.settings.epoch_limit as u64,
         );
         let regions: usize = steady.regions.iter().map(Vec::len).sum();
-        observer.note(&format!(
-            "{} steps: {:.3} a step, {regions} regions",
+        observer.status(&format!(
+            "{} steps, {:.3} a step, {regions} nodes",
             self.state.experience.samples,
             earned.reward / earned.steps as f64
         ));
@@ -262,15 +287,16 @@ impl<'a> Run<'a> {
             draft.nodes.len(),
             if adopted { "adopted" } else { "not adopted" }
         ));
-        self.state.tried += 1;
         if adopted {
             let converged = steady.converged(&self.task);
             self.state.best = Some(Best {
+                memory: self.state.tried,
                 draft,
                 steady,
                 converged,
             });
         }
+        self.state.tried += 1;
     }
 
     /// The next memory worth trying. One needs events at two places; a count of an action is only tried for actions that the agent
@@ -353,7 +379,7 @@ impl<'a> Run<'a> {
             learning,
             experience,
             curve,
-            ..
+            tried,
         } = &self.state;
         let unfinished = || {
             let steady = learning
@@ -368,8 +394,11 @@ impl<'a> Run<'a> {
             automaton: draft.compile(&self.task),
             converged: best.as_ref().is_some_and(|best| best.converged),
             samples: experience.samples,
-            memory: draft.memory.describe(&self.action_names()),
-            curve: curve.clone(),
+            learning: Learning {
+                memory: draft.memory.describe(&self.action_names()),
+                adopted: best.as_ref().map_or(*tried, |best| best.memory),
+                curve: curve.clone(),
+            },
         }
     }
 }

@@ -62,7 +62,7 @@ impl<'a> Task<'a> {
             let deviation = covariance[(i, i)].sqrt();
             if deviation <= 0.0 {
                 return Err(refuse(format!(
-                    "its neighbourhoods are measured by the steady uncertainty, and {} is known exactly; give motion or sensor some noise",
+                    "its neighbourhoods are measured by the steady uncertainty, and {} is known exactly; add noise to [motion] or [sensor]",
                     variable.name
                 )));
             }
@@ -71,7 +71,7 @@ impl<'a> Task<'a> {
         let cells = cells_needed(&bounds, &side);
         if cells > settings.cell_limit as f64 {
             return Err(refuse(format!(
-                "its bounds hold {cells:e} neighbourhoods of {} standard deviations, more than the {} allowed; raise `cell` or `cell_limit`",
+                "its bounds hold {cells:e} neighbourhoods of {} standard deviations, more than the {} allowed; set the learner's `cell` or `cell_limit` higher",
                 settings.cell, settings.cell_limit
             )));
         }
@@ -225,7 +225,7 @@ fn chain(mdp: &BeliefMdp) -> std::result::Result<Vec<LevelId>, String> {
     let start = mdp.start().level;
     let Some(steady) = levels.steady(start, 0) else {
         return Err(format!(
-            "its uncertainty does not settle within {} levels; raise `belief.level_tolerance`",
+            "its uncertainty does not settle within {} levels; set `belief.level_tolerance` higher",
             levels.len()
         ));
     };
