@@ -2,13 +2,14 @@
 
 use crate::belief::{Belief, Filter};
 use crate::model::ActionId;
-use crate::policy::{Automaton, Matching, NodeId, Place, Policy};
+use crate::policy::{Automaton, Coordinates, MOST_COORDINATES, Matching, NodeId, Place, Policy};
 
 /// Runs an automaton: keeps its belief, matches its nodes.
 #[derive(Debug, Clone)]
 pub struct Controller {
     filter: Filter,
     matching: Matching,
+    coordinates: Option<Coordinates>,
     levels: usize,
     /// By mode and level: where its candidates start and end.
     ranges: Vec<(usize, usize)>,
@@ -30,6 +31,7 @@ impl Controller {
         let levels = automaton.levels.len();
         let mut controller = Self {
             matching: automaton.matching,
+            coordinates: automaton.coordinates.clone(),
             levels,
             ranges: Vec::new(),
             corners: Vec::new(),
@@ -98,11 +100,22 @@ impl Controller {
         if from == to {
             return (0, 0);
         }
-        let best = match self.matching {
-            Matching::Nearest => self.nearest(from, to, &belief.mean),
-            Matching::Segments => self.segment(from, to, &belief.mean),
+        let best = match &self.coordinates {
+            None => self.match_place(from, to, &belief.mean),
+            Some(coordinates) => {
+                let mut place = [0.0; MOST_COORDINATES];
+                coordinates.write(&belief.mean, &mut place);
+                self.match_place(from, to, &place[..coordinates.count()])
+            }
         };
         self.nodes[best]
+    }
+
+    fn match_place(&self, from: usize, to: usize, place: &[f64]) -> usize {
+        match self.matching {
+            Matching::Nearest => self.nearest(from, to, place),
+            Matching::Segments => self.segment(from, to, place),
+        }
     }
 
     fn nearest(&self, from: usize, to: usize, mean: &[f64]) -> usize {

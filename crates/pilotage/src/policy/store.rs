@@ -132,7 +132,12 @@ impl Automaton {
         if self.filter.states() != n || !self.filter.fits(sizes.0, sizes.1, sizes.2) {
             return Some("the filter does not fit the states, levels and actions");
         }
-        if self.scale.len() != n || !self.scale.iter().all(|s| *s > 0.0 && s.is_finite()) {
+        let coordinates = self.coordinates.as_ref();
+        if coordinates.is_some_and(|coordinates| !coordinates.fits(n)) {
+            return Some("the coordinates are not named vectors of the state");
+        }
+        let places = self.place_names().len();
+        if self.scale.len() != places || !self.scale.iter().all(|s| *s > 0.0 && s.is_finite()) {
             return Some("the scale is not one positive number for each state variable");
         }
         let square = |level: &Vec<f64>| level.len() == n * n && level.iter().all(|p| p.is_finite());
@@ -143,7 +148,7 @@ impl Automaton {
     }
 
     fn node_fault(&self, node: &Node) -> Option<String> {
-        let n = self.states.len();
+        let n = self.place_names().len();
         let fits =
             |values: &[f64]| values.len() == n && values.iter().all(|value| value.is_finite());
         let place_fits = match &node.place {

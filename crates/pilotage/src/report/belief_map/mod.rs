@@ -33,6 +33,8 @@ pub fn belief_map_svg(
     policy: &dyn Policy,
     automaton: Option<&Automaton>,
 ) -> Result<String> {
+    // Places in coordinates of their own have no frames among the state variables.
+    let automaton = automaton.filter(|automaton| automaton.coordinates.is_none());
     if let Some(automaton) = automaton {
         check(mdp, automaton)?;
     }

@@ -9,6 +9,8 @@
 //! collected by neighbourhood and action, and a test with a stated error rate says whether another action is better there
 //! ([`Settings::split_error`]). The printed rules are kept as [`Rules::Printed`].
 //!
+//! Neighbourhoods are the cells of a lattice along the state variables, or along the modes of a motion that mixes them (`axes`).
+//!
 //! 1. *The steady level* (`steady`): Q-learning with Boltzmann exploration; every epoch, best actions, splits, extensions and
 //!    merges (`regions`), until they no longer change.
 //! 2. *Memory* (`memory`, `edges`): where events far apart are notably rewarded, the place of the last one may matter. A memory is
@@ -19,6 +21,7 @@
 //! # References
 //! C. J. C. H. Watkins, *Learning from Delayed Rewards*, 1989 (Q-learning and Q(lambda)).
 
+mod axes;
 mod checkpoint;
 mod commit;
 mod draft;
@@ -95,9 +98,9 @@ pub struct Point {
 pub struct RegionValue {
     /// Memory it belongs to.
     pub memory: usize,
-    /// Lower corner, length `n`.
+    /// Lower corner, in the coordinates of the automaton.
     pub lower: Vec<f64>,
-    /// Upper corner, length `n`.
+    /// Upper corner.
     pub upper: Vec<f64>,
     /// Its action.
     pub action: ActionId,
@@ -303,6 +306,10 @@ impl<'a> Run<'a> {
     /// believes do not move it, for any other shows in its belief.
     fn next_memory(&self) -> Option<Steady> {
         let (task, experience) = (&self.task, &self.state.experience);
+        // Edges are boxes of state variables.
+        if task.coordinates.is_some() {
+            return None;
+        }
         let threshold = task.settings.notable * experience.rewards.1;
         let notable = experience
             .events

@@ -26,6 +26,10 @@ pub struct Settings {
     pub rules: Rules,
     /// Side of a neighbourhood of the lattice that collects evidence, in `sqrt(P)` of the steady level; more than 0, at most 10.
     pub cell: f64,
+    /// A neighbourhood also need not be finer than this share of what an action moves; at least 0.
+    pub cell_stride: f64,
+    /// Most neighbourhoods along an axis; at least 1.
+    pub cells_along: usize,
     /// Most neighbourhoods; at least 1.
     pub cell_limit: usize,
     /// Watkins' lambda, in `[0, 1]`; 0 is one-step Q-learning.
@@ -87,6 +91,8 @@ impl Default for Settings {
             seed: 1,
             rules: Rules::Tested,
             cell: 0.85,
+            cell_stride: 0.35,
+            cells_along: 32,
             cell_limit: 4_000,
             lambda: 0.0,
             rate_power: 0.7,
@@ -157,6 +163,12 @@ impl Settings {
                 self.cell,
                 self.cell > 0.0 && self.cell <= 10.0,
                 "more than 0, at most 10",
+            ),
+            (
+                "cell_stride",
+                self.cell_stride,
+                self.cell_stride >= 0.0 && self.cell_stride.is_finite(),
+                "at least 0",
             ),
             (
                 "lambda",
@@ -274,6 +286,7 @@ impl Settings {
         }
         let counts = [
             ("cell_limit", self.cell_limit, 1),
+            ("cells_along", self.cells_along, 1),
             ("epoch", self.epoch, 1),
             ("epoch_per_cell", self.epoch_per_cell, 1),
             ("epoch_limit", self.epoch_limit, 1),
