@@ -114,6 +114,42 @@ impl Automaton {
         })
     }
 
+    /// Whether it can act in the world of a model, be it made for another one: the same actions and state variables in the same order, and
+    /// as many readings.
+    ///
+    /// # Errors
+    /// [`Error::Policy`] with the first difference.
+    pub fn check_world(&self, world: &Model, origin: &str) -> Result<()> {
+        let fail = |what: &str, own: &[String], others: Vec<&str>| Error::Policy {
+            origin: origin.to_owned(),
+            reason: format!(
+                "this policy has the {what} {}, and the world of {} has {}; choose a world with the same",
+                own.join(", "),
+                world.name,
+                others.join(", ")
+            ),
+        };
+        let actions: Vec<&str> = world.actions.iter().map(|a| a.name.as_str()).collect();
+        if self.actions != actions {
+            return Err(fail("actions", &self.actions, actions));
+        }
+        let states: Vec<&str> = world.state.iter().map(|v| v.name.as_str()).collect();
+        if self.states != states {
+            return Err(fail("state variables", &self.states, states));
+        }
+        if self.filter.readings() != world.observation_dim() {
+            return Err(Error::Policy {
+                origin: origin.to_owned(),
+                reason: format!(
+                    "the world of {} gives {} readings, which this policy's filter does not fit; choose a world with the same sensor",
+                    world.name,
+                    world.observation_dim()
+                ),
+            });
+        }
+        Ok(())
+    }
+
     fn check(&self) -> std::result::Result<(), String> {
         let fault = self.filter_fault().map(str::to_owned).or_else(|| {
             let nodes = self.nodes.iter().enumerate();
