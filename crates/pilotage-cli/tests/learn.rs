@@ -169,6 +169,40 @@ fn what_was_learned_is_kept_run_and_drawn() {
 }
 
 #[test]
+fn what_was_learned_acts_in_another_world_that_has_the_same_actions() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    result(&run(
+        here,
+        &[
+            "solve",
+            "basic",
+            "--with",
+            "kafaq",
+            "--json",
+            "--episodes",
+            "20",
+            "--out",
+            "basic.json",
+        ],
+    ));
+    let simulate = |extra: &[&'static str]| {
+        let common = ["simulate", "basic", "--policy", "basic.json", "--json"];
+        [&common[..], &["--episodes", "100"], extra].concat()
+    };
+    let at_home = result(&run(here, &simulate(&[])));
+    let on_robot = result(&run(here, &simulate(&["--world", "robot-basic"])));
+    assert_eq!(on_robot["problem"], "basic");
+    assert_eq!(on_robot["world"], "robot-basic");
+    assert_ne!(on_robot["evaluation"], at_home["evaluation"]);
+    let refused = refusal(here, &simulate(&["--world", "maze-4x4"]));
+    assert!(refused.contains("NORTH"), "{refused}");
+    // The robot's file is another problem, and a policy is for one.
+    let refused = refusal(here, &["simulate", "robot-basic", "--policy", "basic.json"]);
+    assert!(refused.contains("not for robot-basic"), "{refused}");
+}
+
+#[test]
 fn wrong_settings_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let cases = [

@@ -100,10 +100,7 @@ pub fn solve(
     settings: &SolveSettings,
     observer: &dyn Observer,
 ) -> Result<Solution> {
-    // What a learner accepts depends on its settings, and it sees for itself.
-    if !kind.learns() {
-        kind.accepts(model)?;
-    }
+    kind.accepts_with(model, &settings.kafaq)?;
     let mdp = BeliefMdp::new(model);
     if kind == SolverKind::Lqg && lqg::use_of(model) == Ok(lqg::Use::Control) {
         return control(&mdp);

@@ -81,6 +81,11 @@ impl SolverKind {
     /// # Errors
     /// [`Error::Unsupported`] with the reason, and what would do.
     pub fn accepts(self, model: &Model) -> Result<()> {
+        self.accepts_with(model, &kafaq::Settings::default())
+    }
+
+    /// As [`SolverKind::accepts`], for a learner with these settings.
+    pub(super) fn accepts_with(self, model: &Model, settings: &kafaq::Settings) -> Result<()> {
         let reason = match self {
             Self::Kbvi => reward_missing(model).or_else(|| pays_afterwards(model)),
             Self::KbviClosed if quadratic::suits(model) => None,
@@ -90,9 +95,10 @@ impl SolverKind {
                 .or_else(|| pays_afterwards(model))
                 .or_else(|| bound_missing(model))
                 .or_else(|| too_many_variables(model)),
-            Self::Kafaq => return kafaq::accepts(model, &kafaq::Settings::default()),
+            Self::Kafaq => reward_missing(model),
         };
         match reason {
+            None if self == Self::Kafaq => kafaq::accepts(model, settings),
             None => Ok(()),
             Some(reason) => Err(Error::Unsupported {
                 solver: self.name(),
@@ -103,7 +109,7 @@ impl SolverKind {
     }
 }
 
-/// Planners that maximise reward need some, discounted.
+/// Those that maximise reward need some, discounted.
 fn reward_missing(model: &Model) -> Option<String> {
     if model.rewards.is_empty() && model.events.is_empty() && model.episode.failure_reward == 0.0 {
         return Some("nothing in it pays a reward; add a [[reward]]".to_owned());
