@@ -30,7 +30,7 @@ enum Verb {
     /// Read a model file and say what it describes, or what is wrong with it and where.
     Check(check::Arguments),
     /// Find a policy for a problem, and measure what it earns.
-    Solve(solve::Arguments),
+    Solve(Box<solve::Arguments>),
     /// Run a saved policy and measure what it earns.
     Simulate(simulate::Arguments),
     /// Draw a saved policy: its automaton and its map of beliefs, as SVG.

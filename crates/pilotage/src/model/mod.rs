@@ -15,6 +15,7 @@ mod map;
 mod read;
 mod region;
 mod resolve;
+mod robot;
 mod validate;
 
 use nalgebra::{DMatrix, DVector};
@@ -28,6 +29,7 @@ pub use file::schema;
 pub use map::Map;
 pub use read::{load, read};
 pub use region::{Interval, Region};
+pub use robot::Robot;
 
 /// Index into [`Model::actions`].
 pub type ActionId = usize;
@@ -326,6 +328,8 @@ pub enum WorldKind {
     Linear,
     /// The nonlinear cart and pole of Eq. 3.6 and 3.9.
     CartPole(CartPole),
+    /// A two-wheeled robot in a walled arena.
+    Robot(Robot),
 }
 
 /// Parameters of the cart and pole, Table 3.1. State: position m, velocity m/s, angle from upright rad, rad/s.

@@ -10,6 +10,7 @@ mod belief_map;
 mod curve;
 mod finding;
 mod layout;
+mod learning;
 mod palette;
 mod plot;
 mod sheet;
@@ -24,6 +25,7 @@ pub use curve::{Series, curves_svg};
 pub use finding::{
     Algorithm, Figure, Finding, Frame, Hypothesis, Recording, Report, Table, Verdict,
 };
+pub use learning::{returns_svg, values_svg};
 
 use crate::policy::Place;
 

@@ -17,6 +17,7 @@ mod run;
 mod solution;
 mod solver;
 pub mod walled;
+pub mod yardstick;
 
 pub use run::{SolveSettings, solve};
 pub use solution::{Form, Solution, Solved};

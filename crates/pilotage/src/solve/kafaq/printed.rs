@@ -10,7 +10,7 @@
 use super::settings::Settings;
 use super::table::boltzmann;
 use super::task::{SOLVER, Task};
-use super::{Experience, Learned, Point, RegionValue};
+use super::{Experience, Learned, Learning, Point, RegionValue};
 use crate::model::{ActionId, Then};
 use crate::observe::Observer;
 use crate::policy::{Automaton, Matching, Node, Place};
@@ -132,8 +132,11 @@ pub(super) fn learn(task: &Task<'_>, observer: &dyn Observer) -> Learned {
         automaton: compile(task, &regions),
         converged: calm >= CALM,
         samples: experience.samples,
-        memory: "no memory".to_owned(),
-        curve,
+        learning: Learning {
+            memory: "no memory".to_owned(),
+            adopted: 0,
+            curve,
+        },
     }
 }
 

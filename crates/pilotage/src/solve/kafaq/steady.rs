@@ -178,7 +178,7 @@ impl Steady {
         self.table.forget_traces();
         let mut memory = 0;
         for _ in 0..task.mdp.model().episode.length {
-            let cell = task.lattice.cell(&actor.belief.mean);
+            let cell = task.cell(&actor.belief.mean);
             let row = self.row(task, memory, cell);
             let temperature = self.temperature * experience.reward_range();
             let explore = task.settings.explore;
@@ -195,7 +195,7 @@ impl Steady {
                     .memory
                     .next(memory, action, step.reward, &actor.belief.mean),
             };
-            let next_cell = task.lattice.cell(&actor.belief.mean);
+            let next_cell = task.cell(&actor.belief.mean);
             if at_steady {
                 let next = self.row(task, next_memory, next_cell);
                 let transition = Transition {

@@ -1,12 +1,13 @@
 //! What a learner has: its own motion and sensor noise, its body's bounds, and a world to act in.
 
+use super::axes::{axes, extents};
 use super::lattice::{Lattice, cells_needed};
 use super::settings::Settings;
 use crate::belief::{Belief, BeliefMdp, Filter, LevelId};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Model, Then, WorldSpec};
 use crate::parallel;
-use crate::policy::{Automaton, Controller};
+use crate::policy::{Automaton, Controller, Coordinates, MOST_COORDINATES};
 use crate::simulate::{Agent, Episode, run_episode};
 use crate::world::{Draws, Step, World};
 
@@ -28,6 +29,8 @@ pub(super) struct Task<'a> {
     pub mdp: BeliefMdp,
     pub settings: Settings,
     pub worlds: &'a Worlds<'a>,
+    /// What the lattice is laid along; `None` for the state variables.
+    pub coordinates: Option<Coordinates>,
     pub lattice: Lattice,
     pub filter: Filter,
     /// Levels from the start to the steady one.
@@ -56,28 +59,35 @@ impl<'a> Task<'a> {
         }
         let chain = chain(&mdp).map_err(refuse)?;
         let covariance = mdp.levels().covariance(chain[chain.len() - 1]);
-        let bounds: Vec<_> = model.state.iter().map(|variable| variable.bounds).collect();
-        let mut side = Vec::new();
-        for (i, variable) in model.state.iter().enumerate() {
-            let deviation = covariance[(i, i)].sqrt();
-            if deviation <= 0.0 {
-                return Err(refuse(format!(
-                    "its neighbourhoods are measured by the steady uncertainty, and {} is known exactly; give motion or sensor some noise",
-                    variable.name
-                )));
-            }
-            side.push(settings.cell * deviation);
+        let coordinates = axes(model);
+        let extents = extents(model, coordinates.as_ref(), covariance);
+        if let Some(known) = extents.iter().position(|extent| extent.deviation <= 0.0) {
+            return Err(refuse(format!(
+                "its neighbourhoods are measured by the steady uncertainty, and {} is known exactly; add noise to [motion] or [sensor]",
+                model.state[known].name
+            )));
         }
+        let bounds: Vec<_> = extents.iter().map(|extent| extent.bounds).collect();
+        let side: Vec<f64> = extents
+            .iter()
+            .map(|extent| {
+                let finest = settings.cell * extent.deviation;
+                let step = settings.cell_stride * extent.stride;
+                let most = extent.bounds.width() / settings.cells_along as f64;
+                finest.max(step).max(most)
+            })
+            .collect();
         let cells = cells_needed(&bounds, &side);
         if cells > settings.cell_limit as f64 {
             return Err(refuse(format!(
-                "its bounds hold {cells:e} neighbourhoods of {} standard deviations, more than the {} allowed; raise `cell` or `cell_limit`",
+                "its bounds hold {cells:e} neighbourhoods of {} standard deviations, more than the {} allowed; set the learner's `cell` or `cell_limit` higher",
                 settings.cell, settings.cell_limit
             )));
         }
         Ok(Self {
             filter: mdp.filter(),
             lattice: Lattice::new(&bounds, &side),
+            coordinates,
             mdp,
             settings,
             worlds,
@@ -99,6 +109,18 @@ impl<'a> Task<'a> {
     /// The steady level.
     pub fn steady(&self) -> LevelId {
         self.chain[self.chain.len() - 1]
+    }
+
+    /// The neighbourhood of a mean.
+    pub fn cell(&self, mean: &[f64]) -> usize {
+        match &self.coordinates {
+            None => self.lattice.cell(mean),
+            Some(coordinates) => {
+                let mut place = [0.0; MOST_COORDINATES];
+                coordinates.write(mean, &mut place);
+                self.lattice.cell(&place[..coordinates.count()])
+            }
+        }
     }
 
     /// Standard deviation along each variable at the steady level.
@@ -225,7 +247,7 @@ fn chain(mdp: &BeliefMdp) -> std::result::Result<Vec<LevelId>, String> {
     let start = mdp.start().level;
     let Some(steady) = levels.steady(start, 0) else {
         return Err(format!(
-            "its uncertainty does not settle within {} levels; raise `belief.level_tolerance`",
+            "its uncertainty does not settle within {} levels; set `belief.level_tolerance` higher",
             levels.len()
         ));
     };
