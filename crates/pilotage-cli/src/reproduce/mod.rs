@@ -4,6 +4,7 @@ mod chapter4;
 mod chapter5;
 mod chapter6;
 mod context;
+mod learning;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -52,6 +53,36 @@ const EXPERIMENTS: &[Experiment] = &[
         id: "table-4.1",
         about: "uncertainty levels",
         make: chapter4::table_4_1,
+    },
+    Experiment {
+        id: "figure-4.8",
+        about: "KAFAQ in the basic world (and 4.9)",
+        make: learning::figure_4_8,
+    },
+    Experiment {
+        id: "figure-4.10",
+        about: "KAFAQ in the 4x4 maze (and 4.11)",
+        make: learning::figure_4_10,
+    },
+    Experiment {
+        id: "figure-4.12",
+        about: "KAFAQ and the hidden load (and 4.13)",
+        make: learning::figure_4_12,
+    },
+    Experiment {
+        id: "figure-4.14",
+        about: "KAFAQ and the four stations (and 4.15)",
+        make: learning::figure_4_14,
+    },
+    Experiment {
+        id: "figure-4.16",
+        about: "KAFAQ and the shuttle (and 4.17)",
+        make: learning::figure_4_16,
+    },
+    Experiment {
+        id: "section-4.3.6",
+        about: "KAFAQ balances the pole",
+        make: learning::section_4_3_6,
     },
     Experiment {
         id: "figure-5.2",
