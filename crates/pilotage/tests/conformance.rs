@@ -27,6 +27,7 @@ fn small(model: &Model, form: Form) -> SolveSettings {
             epoch: 500,
             epoch_per_cell: 1,
             epoch_limit: 2,
+            cells_along: 8,
             trial: 10,
             ..Default::default()
         },

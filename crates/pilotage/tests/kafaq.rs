@@ -459,7 +459,11 @@ fn models_it_is_not_made_for_are_refused_with_a_reason() {
 #[test]
 fn a_pole_is_balanced_by_a_few_regions_of_its_own_motion() {
     let model = model("cart-pole-sd");
-    let learned = learn(&model, &Settings::default());
+    let coarse = Settings {
+        cells_along: 32,
+        ..Settings::default()
+    };
+    let learned = learn(&model, &coarse);
     assert!(learned.converged);
     let coordinates = learned.automaton.coordinates.as_ref().unwrap();
     for (row, value) in coordinates.rows.iter().zip([1.1177, 1.0]) {

@@ -92,7 +92,7 @@ impl Default for Settings {
             rules: Rules::Tested,
             cell: 0.85,
             cell_stride: 0.35,
-            cells_along: 32,
+            cells_along: 64,
             cell_limit: 4_000,
             lambda: 0.0,
             rate_power: 0.7,
