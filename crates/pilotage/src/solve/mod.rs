@@ -6,6 +6,7 @@ pub mod grid;
 pub mod hazard;
 pub mod kafaq;
 pub mod kbvi;
+mod learn;
 pub mod lqg;
 pub mod lqr;
 pub mod mdp;
