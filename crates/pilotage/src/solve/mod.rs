@@ -1,5 +1,6 @@
 //! Solvers: from a model, or from experience, to a policy. [`solve`] runs any of them by name.
 
+pub mod arkaq;
 pub mod cma;
 pub mod compile;
 pub mod grid;
