@@ -128,3 +128,66 @@ impl<'a> Coding<'a> {
 fn unscaled(x: f64, unit: f64) -> f64 {
     if unit > 0.0 { x / unit } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model;
+    use crate::random::{Role, stream, uniform};
+    use crate::solve::arkaq::Settings;
+    use crate::solve::arkaq::art::{Art, Rule, Settings as Network};
+    use crate::world::{ProblemWorld, World};
+
+    /// Without rewards, the network and the filter that recalls its centres find the same clusters.
+    #[test]
+    fn the_filter_recalls_the_clusters_of_the_network() {
+        let model = model::find("maze-4x4").expect("it is built in");
+        let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&model)) };
+        let settings = Settings {
+            before: 0.7,
+            past: 0.3,
+            action: 0.4,
+            ..Settings::default()
+        };
+        let task = Task::new(&model, settings, &worlds).expect("it has bounds");
+        let coding = Coding::new(&task);
+        let network = Network {
+            vigilance: 0.6,
+            rate: 0.1,
+            rule: Rule::Distance { extent: 1.0 },
+            limit: 100,
+        };
+        let mut art = Art::new(coding.length(), network).expect("settings are in range");
+        let mut rng = stream(1, 0, Role::World);
+        let mut draw = || {
+            (
+                [4.0 * uniform(&mut rng), 4.0 * uniform(&mut rng)],
+                (4.0 * uniform(&mut rng)) as usize,
+            )
+        };
+        let mut at = art
+            .present(&coding.start(&[1.0, 2.0]))
+            .expect("it is finite")
+            .category;
+        for _ in 0..500 {
+            let (mean, action) = draw();
+            let input = coding.arrival(&mean, &art.centres()[at], action, false);
+            at = art.present(&input).expect("it is finite").category;
+        }
+        let recall = coding.recall(art.centres());
+        assert!(recall.clusters().len() > 10);
+        let found = |input: &[f64]| {
+            art.classify(input)
+                .expect("it is finite")
+                .map(|best| best.0)
+        };
+        for _ in 0..500 {
+            let (mean, action) = draw();
+            let input = coding.arrival(&mean, &art.centres()[at], action, false);
+            let next = recall.next(at, action, &mean);
+            assert_eq!(found(&input), Some(next));
+            assert_eq!(found(&coding.start(&mean)), Some(recall.first(&mean)));
+            at = next;
+        }
+    }
+}

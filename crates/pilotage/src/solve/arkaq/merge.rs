@@ -7,7 +7,7 @@ use crate::belief::{Cluster, Sight};
 use crate::solve::learn::{Trial, critical};
 
 /// Pairs tried in a row without success that end it.
-const TRIES: usize = 30;
+const TRIES: usize = 12;
 
 /// The merged draft and the steps that trials took.
 pub(super) fn merge(task: &Task<'_>, draft: Draft) -> (Draft, u64) {

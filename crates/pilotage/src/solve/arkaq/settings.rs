@@ -92,8 +92,8 @@ impl Default for Settings {
             cooling: 0.85,
             explore: 0.05,
             epoch: 5_000,
-            epoch_per_entry: 50,
-            epoch_limit: 100,
+            epoch_per_entry: 25,
+            epoch_limit: 80,
             still: 0.02,
             calm: 5,
             merge: false,
@@ -107,11 +107,15 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// ARKAQ with what the thesis left to be done (chapter 7): vigilance that tunes itself, clusters that merge, and Q(lambda).
+    /// ARKAQ with what the thesis left to be done (chapter 7): vigilance that tunes itself, clusters that merge, and Q(lambda); and with
+    /// a memory that reaches farther back than one cluster.
     pub fn extended() -> Self {
         Self {
-            vigilances: vec![0.1, 0.3, 0.5, 0.6, 0.7, 0.8, 0.9],
-            lambda: 0.5,
+            vigilances: vec![0.1, 0.3, 0.5, 0.7, 0.8],
+            lambda: 0.9,
+            before: 1.0,
+            past: 0.3,
+            action: 1.0,
             merge: true,
             ..Self::default()
         }
