@@ -17,6 +17,7 @@ use pilotage::model::{self, Model};
 use pilotage::observe::Silent;
 use pilotage::policy::write_whole;
 use pilotage::simulate::Options;
+use pilotage::solve::kbvi::closed;
 use pilotage::solve::yardstick::{Yardstick, yardsticks};
 use serde_json::json;
 
@@ -88,7 +89,7 @@ fn measure(name: &str, seeds: u64) -> Measured {
     let robot = ON_ROBOT
         .contains(&name)
         .then(|| model::find(&format!("robot-{name}")).unwrap());
-    let yardsticks = yardsticks(&model, EVALUATION, &Silent).unwrap();
+    let yardsticks = yardsticks(&model, &closed::Settings::default(), EVALUATION, &Silent).unwrap();
     let runs = (1..=seeds)
         .map(|seed| {
             eprintln!("{name}, seed {seed}");

@@ -31,21 +31,12 @@ pub struct Yardstick {
 /// As [`closed::solve`].
 pub fn yardsticks(
     model: &Model,
+    planner: &closed::Settings,
     options: Options,
     observer: &dyn Observer,
 ) -> Result<Vec<Yardstick>> {
-    let told = if model.world.motion.controls.is_empty() {
-        model.clone()
-    } else {
-        controls_told(model)
-    };
-    let plan = |model: &Model| {
-        closed::solve(
-            &BeliefMdp::new(model),
-            &closed::Settings::default(),
-            observer,
-        )
-    };
+    let told = told(model);
+    let plan = |model: &Model| closed::solve(&BeliefMdp::new(model), planner, observer);
     let earned = |world: &Model, policy: &closed::GridPolicy| {
         evaluate(world, &policy.mdp().filter(), policy, options, observer)
     };
@@ -75,6 +66,15 @@ pub fn yardsticks(
         );
     }
     Ok(found)
+}
+
+/// The model as a planner has to be told it.
+pub fn told(model: &Model) -> Model {
+    if model.world.motion.controls.is_empty() {
+        model.clone()
+    } else {
+        controls_told(model)
+    }
 }
 
 /// The model of one who knows what each mode's controls are: moving the way the mode does not allow is ruled out by its cost. Made

@@ -2,15 +2,14 @@
 //! `r + discount V` of the level that the step leads to. A level inherits the regions of that level and has its own only where
 //! evidence calls for them.
 
-use super::Experience;
 use super::draft::{Draft, DraftNode};
 use super::evidence::Halves;
 use super::regions::{Region, Reviser, actions_by_cell};
 use super::steady::Steady;
-use super::table::any_action;
 use super::task::Task;
 use crate::model::Then;
 use crate::random::uniform;
+use crate::solve::learn::{Experience, any_action};
 
 /// Fewest visits of a level.
 const VISITS: usize = 1_000;
@@ -115,7 +114,7 @@ fn explore_level(
     let mut evidence = vec![Halves::new(cells, actions); draft.memory.len()];
     let mut actor = task.actor();
     for _ in 0..(task.settings.epoch_per_cell * cells * actions).max(VISITS) {
-        let (mut draws, mut exploration) = experience.next_episode(task);
+        let (mut draws, mut exploration) = experience.next_episode(task.settings.seed);
         actor.reset(&mut draws);
         let mut memory = 0;
         for passed in 0..=level {

@@ -33,7 +33,6 @@ mod printed;
 mod regions;
 mod settings;
 mod steady;
-mod table;
 mod task;
 mod tidy;
 
@@ -41,20 +40,19 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::solve::learn::Worlds;
 pub use settings::{Rules, Settings};
-pub use task::Worlds;
 
 use crate::error::Result;
 use crate::model::{ActionId, Model};
 use crate::observe::Observer;
 use crate::policy::Automaton;
-use crate::random::{Rng, Role, stream};
-use crate::world::{Draws, ProblemWorld, World};
+use crate::solve::learn::{Experience, Trial, critical, undiscounted};
+use crate::world::{ProblemWorld, World};
 use draft::Draft;
-use evidence::critical;
 use memory::{Kind, Memory};
 use steady::Steady;
-use task::{Task, Trial, undiscounted};
+use task::Task;
 
 /// What a learning run found.
 #[derive(Debug, Clone, PartialEq)]
@@ -182,39 +180,6 @@ struct Best {
     draft: Draft,
     steady: Steady,
     converged: bool,
-}
-
-/// What a learner has met.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-struct Experience {
-    episodes: u64,
-    samples: u64,
-    /// Smallest and largest reward, 0 included.
-    rewards: (f64, f64),
-    /// Notable rewards with the mean at which they were seen.
-    events: Vec<(f64, Vec<f64>)>,
-}
-
-impl Experience {
-    /// Random numbers of the next episode: for the world, and for exploration.
-    fn next_episode(&mut self, task: &Task<'_>) -> (Draws, Rng) {
-        let (seed, episode) = (task.settings.seed, self.episodes);
-        self.episodes += 1;
-        (
-            Draws::new(seed, episode),
-            stream(seed, episode, Role::Exploration),
-        )
-    }
-
-    /// Takes in a step.
-    fn collect(&mut self, reward: f64) {
-        self.samples += 1;
-        self.rewards = (self.rewards.0.min(reward), self.rewards.1.max(reward));
-    }
-
-    fn reward_range(&self) -> f64 {
-        (self.rewards.1 - self.rewards.0).max(1e-6)
-    }
 }
 
 impl<'a> Run<'a> {

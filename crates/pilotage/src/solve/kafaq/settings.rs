@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::model::suggest;
+use crate::solve::learn::{Rates, ensure};
 
 /// How regions change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -150,10 +151,19 @@ impl Settings {
         Ok(())
     }
 
+    /// How fast values are learned.
+    pub(super) fn rates(&self) -> Rates {
+        Rates {
+            lambda: self.lambda,
+            power: self.rate_power,
+            floor: self.rate_floor,
+        }
+    }
+
     /// Checks every setting against its range.
     ///
     /// # Errors
-    /// [`Error::Setting`] for the first that is out of range.
+    /// [`crate::Error::Setting`] for the first that is out of range.
     pub fn validate(&self) -> Result<()> {
         let open = |x: f64, low: f64, high: f64| low < x && x < high;
         let error_rate = "more than 0 and less than 0.5, such as 0.001";
@@ -310,20 +320,4 @@ impl Settings {
         }
         Ok(())
     }
-}
-
-fn ensure(
-    setting: &'static str,
-    value: impl ToString,
-    fits: bool,
-    range: &'static str,
-) -> Result<()> {
-    if fits {
-        return Ok(());
-    }
-    Err(Error::Setting {
-        setting,
-        value: value.to_string(),
-        range,
-    })
 }
