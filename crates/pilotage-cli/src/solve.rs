@@ -9,10 +9,10 @@ use pilotage::model::{self, Model, WallBelief, Walls};
 use pilotage::policy::write_whole;
 use pilotage::report::{returns_svg, values_svg};
 use pilotage::simulate::Evaluation as Earned;
-use pilotage::solve::kafaq;
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
 use pilotage::solve::lqg::Weights;
 use pilotage::solve::{Form, Solution, SolveSettings, SolverKind, solve};
+use pilotage::solve::{arkaq, kafaq};
 use serde_json::json;
 
 use crate::failure::Failure;
@@ -66,16 +66,19 @@ fn key_and_value(text: &str) -> Result<(String, String), String> {
 }
 
 impl Learner {
-    /// As the library wants them, with the seed of the run.
-    fn settings(&self, seed: u64) -> Result<kafaq::Settings, Failure> {
-        let mut settings = kafaq::Settings::default();
+    /// A learner's settings with those given by name; the seed is the run's.
+    fn settings<S: Default>(
+        &self,
+        set: impl Fn(&mut S, &str, &str) -> pilotage::Result<()>,
+    ) -> Result<S, Failure> {
+        let mut settings = S::default();
         for (key, value) in &self.learn {
             if key == "seed" {
                 return Err(Failure::Usage("the seed is set by --seed".to_owned()));
             }
-            settings.set(key, value)?;
+            set(&mut settings, key, value)?;
         }
-        Ok(kafaq::Settings { seed, ..settings })
+        Ok(settings)
     }
 
     /// Whether any of it was asked for.
@@ -171,7 +174,7 @@ impl Formula {
 }
 
 impl Arguments {
-    fn settings(&self) -> Result<SolveSettings, Failure> {
+    fn settings(&self, solver: SolverKind) -> Result<SolveSettings, Failure> {
         Ok(SolveSettings {
             form: Form::parse(&self.policy)?,
             seed: self.evaluation.seed,
@@ -187,7 +190,16 @@ impl Arguments {
                 state: self.planner.state_weights.clone(),
                 control: self.planner.control_weights.clone(),
             },
-            kafaq: self.learner.settings(self.evaluation.seed)?,
+            kafaq: if solver == SolverKind::Arkaq {
+                kafaq::Settings::default()
+            } else {
+                self.learner.settings(kafaq::Settings::set)?
+            },
+            arkaq: if solver == SolverKind::Arkaq {
+                self.learner.settings(arkaq::Settings::set)?
+            } else {
+                arkaq::Settings::default()
+            },
             checkpoint: self.learner.checkpoint.clone(),
         })
     }
@@ -195,7 +207,7 @@ impl Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let solver = SolverKind::parse(&arguments.with)?;
-    let settings = arguments.settings()?;
+    let settings = arguments.settings(solver)?;
     if arguments.out.is_some() && settings.form == Form::Grid {
         return Err(Failure::Usage(
             "a planner that is not compiled cannot be saved; choose --policy nearest or segments"
@@ -290,7 +302,7 @@ fn shown(
     if let (Some(learning), Some(samples)) = (&solution.learning, solution.samples) {
         lines.push(format!(
             "  learned in {samples} steps, with {}",
-            learning.memory
+            learning.describe()
         ));
     }
     if !solution.converged {

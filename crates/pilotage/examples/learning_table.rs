@@ -259,7 +259,13 @@ fn run_arkaq(
     };
     let learned = arkaq::learn(model, worlds, &settings, None, &Silent).unwrap();
     // No cluster mixes rewarded beliefs with others.
-    let rewarded = || learned.clusters.iter().map(|cluster| cluster.rewarded);
+    let rewarded = || {
+        learned
+            .learning
+            .clusters
+            .iter()
+            .map(|cluster| cluster.rewarded)
+    };
     let apart = rewarded().all(|x| x == 0.0 || x == 1.0) && rewarded().any(|x| x == 1.0);
     Run {
         seed,
@@ -268,9 +274,9 @@ fn run_arkaq(
         samples: learned.samples,
         converged: learned.converged,
         network: Some((
-            learned.vigilance,
-            learned.clusters.len(),
-            learned.capped,
+            learned.learning.vigilance,
+            learned.learning.clusters.len(),
+            learned.learning.capped,
             apart,
         )),
         automaton: learned.automaton,

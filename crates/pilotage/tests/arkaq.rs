@@ -76,13 +76,19 @@ fn the_hallway_has_few_clusters_at_low_vigilance_and_more_at_high_and_the_goal_i
     let mut clusters = 0;
     for (vigilance, most) in [(0.1, 4), (0.5, 30), (0.9, 200)] {
         let learned = learn(&model, &at(vigilance));
-        let found = learned.clusters.len();
+        let found = learned.learning.clusters.len();
         assert!(
             clusters < found && found <= most,
             "{found} clusters at {vigilance}"
         );
         clusters = found;
-        let rewarded = |share: f64| learned.clusters.iter().filter(move |c| c.rewarded == share);
+        let rewarded = |share: f64| {
+            learned
+                .learning
+                .clusters
+                .iter()
+                .filter(move |c| c.rewarded == share)
+        };
         assert!(rewarded(1.0).count() >= 1, "no goal at {vigilance}");
         assert_eq!(
             rewarded(0.0).count() + rewarded(1.0).count(),
@@ -136,7 +142,7 @@ fn merging_leaves_fewer_nodes_and_loses_nothing() {
         ..at(0.7)
     };
     let (learned, merged) = (learn(&model, &at(0.7)), learn(&model, &merging));
-    assert_eq!(learned.clusters, merged.clusters);
+    assert_eq!(learned.learning.clusters, merged.learning.clusters);
     assert!(4 * merged.automaton.nodes.len() <= learned.automaton.nodes.len());
     let [before, after] = [&learned, &merged].map(|l| earned(&model, &l.automaton).discounted);
     // Merging may cost a hundredth in its own trials; the rest is what 500 episodes leave open.
@@ -163,7 +169,7 @@ fn too_many_clusters_end_exploration_with_a_clear_statement() {
     };
     let notes = Notes(Mutex::default());
     let learned = learn_in(&model, &model, &settings, &notes).unwrap();
-    assert!(learned.capped && !learned.converged);
+    assert!(learned.learning.capped && !learned.converged);
     assert_eq!(learned.automaton.nodes.len(), 40);
     let notes = notes.0.into_inner().unwrap();
     let said = notes
@@ -182,9 +188,21 @@ fn vigilance_that_tunes_itself_stops_at_the_limit_and_keeps_the_best() {
     };
     let learned = learn(&model, &settings);
     // 0.1 cannot tell loaded from empty; 0.9 needs too many, so that 0.95 is not tried.
-    assert!(learned.vigilance > 0.1);
-    assert!(learned.curve.iter().any(|point| point.vigilance == 0.9));
-    assert!(learned.curve.iter().all(|point| point.vigilance < 0.95));
+    assert!(learned.learning.vigilance > 0.1);
+    assert!(
+        learned
+            .learning
+            .curve
+            .iter()
+            .any(|point| point.vigilance == 0.9)
+    );
+    assert!(
+        learned
+            .learning
+            .curve
+            .iter()
+            .all(|point| point.vigilance < 0.95)
+    );
 }
 
 #[test]
@@ -215,7 +233,7 @@ fn a_run_is_its_seed_and_a_resumed_one_ends_like_one_never_stopped() {
         seed: 2,
         ..hurried()
     };
-    assert_ne!(whole.curve, learn(&model, &other).curve);
+    assert_ne!(whole.learning.curve, learn(&model, &other).learning.curve);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("checkpoint");
     let mut run = Run::new(&model, &worlds, &hurried()).unwrap();
@@ -243,7 +261,7 @@ fn rewards_and_map_are_learned_and_not_read() {
         learn_in(&world, &world, &hurried(), &Silent).unwrap(),
         learn_in(&world, &told, &hurried(), &Silent).unwrap(),
     );
-    assert_eq!(all.curve, little.curve);
+    assert_eq!(all.learning.curve, little.learning.curve);
     assert_eq!(all.automaton.nodes, little.automaton.nodes);
 }
 

@@ -8,8 +8,8 @@ use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller, Policy};
 use pilotage::random::{Rng, Role, normal, stream};
 use pilotage::simulate::Options;
-use pilotage::solve::kafaq;
 use pilotage::solve::{Form, Solution, SolveSettings, Solved, SolverKind, rollout, solve};
+use pilotage::solve::{arkaq, kafaq};
 
 /// Settings small enough for a test of all pairs; what is found need not be good.
 fn small(model: &Model, form: Form) -> SolveSettings {
@@ -28,6 +28,18 @@ fn small(model: &Model, form: Form) -> SolveSettings {
             epoch_per_cell: 1,
             epoch_limit: 2,
             cells_along: 8,
+            trial: 10,
+            ..Default::default()
+        },
+        arkaq: arkaq::Settings {
+            vigilances: vec![0.5],
+            scout: 200,
+            settle: 50,
+            explore_limit: 1000,
+            cluster_limit: 20,
+            epoch: 500,
+            epoch_per_entry: 1,
+            epoch_limit: 2,
             trial: 10,
             ..Default::default()
         },

@@ -6,10 +6,10 @@ use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller};
 use pilotage::report::{Finding, Verdict, returns_svg, values_svg};
 use pilotage::simulate::{Evaluation, LifeOptions, Options, evaluate, life};
-use pilotage::solve::compile;
 use pilotage::solve::kafaq::{self, Learned};
 use pilotage::solve::kbvi::closed;
 use pilotage::solve::yardstick::yardsticks;
+use pilotage::solve::{Learning, compile};
 use pilotage::world::{ProblemWorld, World};
 use rayon::prelude::*;
 
@@ -149,7 +149,8 @@ fn reproduced(context: &Context<'_>, problem_: &Problem) -> Result<Finding, Fail
             others,
         );
     if let Some(first) = runs.first() {
-        let (automaton, learning) = (&first.learned.automaton, &first.learned.learning);
+        let automaton = &first.learned.automaton;
+        let learning = &Learning::Kafaq(first.learned.learning.clone());
         draft = draft
             .automaton(format!("The automaton of seed {}", context.seed), automaton)?
             .figure("Q-values while learning", values_svg(automaton, learning)?)
@@ -297,7 +298,7 @@ pub fn section_4_3_6(context: &Context<'_>) -> Result<Finding, Failure> {
     if let Some((first, _)) = lives.first() {
         draft = draft.figure(
             format!("Reward a step while seed {} learned", context.seed),
-            returns_svg(&first.automaton, &first.learning)?,
+            returns_svg(&first.automaton, &Learning::Kafaq(first.learning.clone()))?,
         );
     }
     Ok(draft.verdict(judge(

@@ -3,22 +3,43 @@
 use super::curve::{Series, curves_svg};
 use crate::error::Result;
 use crate::policy::Automaton;
-use crate::solve::kafaq::{Learning, Point, RegionValue};
+use crate::solve::kafaq::{Point, RegionValue};
+use crate::solve::{Learning, arkaq, kafaq};
 
 const STEPS: &str = "steps of experience";
 
-/// Draws the reward a step, exploration included, one line for each memory that was tried.
+/// Draws the reward a step, exploration included, one line for each memory or vigilance that was tried.
 ///
 /// # Errors
 /// As [`curves_svg`].
 pub fn returns_svg(automaton: &Automaton, learning: &Learning) -> Result<String> {
-    let tried = learning
-        .curve
-        .iter()
-        .map(|point| point.memory + 1)
-        .max()
-        .unwrap_or(0);
-    let series: Vec<Series> = (0..tried)
+    let series = match learning {
+        Learning::Kafaq(learning) => by_memory(learning),
+        Learning::Arkaq(learning) => by_vigilance(learning),
+    };
+    let title = format!("{}: return while learning", automaton.problem);
+    curves_svg(&title, STEPS, "reward a step", &series)
+}
+
+/// Draws `Q` of the best action: one line for the middle of every region learned last, or for every cluster.
+///
+/// # Errors
+/// As [`curves_svg`].
+pub fn values_svg(automaton: &Automaton, learning: &Learning) -> Result<String> {
+    let (series, label) = match learning {
+        Learning::Kafaq(learning) => (of_regions(automaton, learning), "Q of the region's action"),
+        Learning::Arkaq(learning) => (
+            of_clusters(automaton, learning),
+            "Q of the cluster's action",
+        ),
+    };
+    let title = format!("{}: action values while learning", automaton.problem);
+    curves_svg(&title, STEPS, label, &series)
+}
+
+fn by_memory(learning: &kafaq::Learning) -> Vec<Series> {
+    let tried = learning.curve.iter().map(|point| point.memory + 1).max();
+    (0..tried.unwrap_or(0))
         .map(|memory| Series {
             name: if memory == learning.adopted {
                 learning.memory.clone()
@@ -30,40 +51,76 @@ pub fn returns_svg(automaton: &Automaton, learning: &Learning) -> Result<String>
                 .collect(),
             band: None,
         })
-        .collect();
-    let title = format!("{}: return while learning", automaton.problem);
-    curves_svg(&title, STEPS, "reward a step", &series)
+        .collect()
 }
 
-/// Draws `Q` of the region that held a place, one line for the middle of every region learned last.
-///
-/// # Errors
-/// As [`curves_svg`].
-pub fn values_svg(automaton: &Automaton, learning: &Learning) -> Result<String> {
+fn by_vigilance(learning: &arkaq::Learning) -> Vec<Series> {
+    let mut series: Vec<Series> = Vec::new();
+    for point in &learning.curve {
+        let name = format!("vigilance {}", point.vigilance);
+        if series.last().is_none_or(|last| last.name != name) {
+            series.push(Series {
+                name,
+                ..Series::default()
+            });
+        }
+        if let Some(last) = series.last_mut() {
+            last.points.push((point.samples as f64, point.reward));
+        }
+    }
+    series
+}
+
+fn of_regions(automaton: &Automaton, learning: &kafaq::Learning) -> Vec<Series> {
     let regions = epochs(learning, learning.adopted)
         .last()
         .map_or([].as_slice(), |last| &last.regions);
-    let series: Vec<Series> = regions
-        .iter()
-        .map(|region| {
-            let middle = middle(region);
-            let points = epochs(learning, learning.adopted).map(|point| {
-                let value =
-                    holder(point, region.memory, &middle).map_or(f64::NAN, |region| region.value);
-                (point.samples as f64, value)
-            });
-            Series {
-                name: name(automaton, region, &middle),
-                points: points.collect(),
-                band: None,
-            }
-        })
-        .collect();
-    let title = format!("{}: action values while learning", automaton.problem);
-    curves_svg(&title, STEPS, "Q of the region's action", &series)
+    let line = |region: &RegionValue| {
+        let middle = middle(region);
+        let points = epochs(learning, learning.adopted).map(|point| {
+            let value =
+                holder(point, region.memory, &middle).map_or(f64::NAN, |region| region.value);
+            (point.samples as f64, value)
+        });
+        Series {
+            name: name(automaton, region, &middle),
+            points: points.collect(),
+            band: None,
+        }
+    };
+    regions.iter().map(line).collect()
 }
 
-fn epochs(learning: &Learning, memory: usize) -> impl Iterator<Item = &Point> {
+/// Most clusters whose values are drawn: those founded first.
+const MOST_CLUSTERS: usize = 12;
+
+fn of_clusters(automaton: &Automaton, learning: &arkaq::Learning) -> Vec<Series> {
+    let epochs = || {
+        let kept = |point: &&arkaq::Point| point.vigilance == learning.vigilance;
+        learning.curve.iter().filter(kept)
+    };
+    let last = epochs()
+        .next_back()
+        .map_or([].as_slice(), |last| &last.clusters);
+    let line = |(id, &(action, _)): (usize, &(usize, f64))| {
+        let action = automaton.actions.get(action).map_or("?", String::as_str);
+        let value = |point: &arkaq::Point| point.clusters.get(id).map_or(f64::NAN, |one| one.1);
+        Series {
+            name: format!("cluster {id}, {action}"),
+            points: epochs()
+                .map(|point| (point.samples as f64, value(point)))
+                .collect(),
+            band: None,
+        }
+    };
+    last.iter()
+        .enumerate()
+        .take(MOST_CLUSTERS)
+        .map(line)
+        .collect()
+}
+
+fn epochs(learning: &kafaq::Learning, memory: usize) -> impl Iterator<Item = &Point> {
     let of = move |point: &&Point| point.memory == memory;
     learning.curve.iter().filter(of)
 }

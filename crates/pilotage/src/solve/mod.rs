@@ -22,5 +22,5 @@ pub mod walled;
 pub mod yardstick;
 
 pub use run::{SolveSettings, solve};
-pub use solution::{Form, Solution, Solved};
+pub use solution::{Form, Learning, Solution, Solved};
 pub use solver::SolverKind;

@@ -7,7 +7,7 @@ use super::kbvi::branches::{self, Branches};
 use super::kbvi::{closed, formulas::Formulas, generate, quadratic};
 use super::mls::MostLikelyState;
 use super::qmdp::Qmdp;
-use super::{Form, Solution, Solved, SolverKind, compile, kafaq, lqg, mdp};
+use super::{Form, Learning, Solution, Solved, SolverKind, arkaq, compile, kafaq, lqg, mdp};
 use crate::belief::BeliefMdp;
 use crate::error::Result;
 use crate::model::Model;
@@ -42,6 +42,8 @@ pub struct SolveSettings {
     pub weights: lqg::Weights,
     /// What concerns `kafaq` alone; its seed is `seed`.
     pub kafaq: kafaq::Settings,
+    /// What concerns `arkaq` alone; its seed is `seed`.
+    pub arkaq: arkaq::Settings,
     /// File in which a learner keeps its state, to go on from there if it is stopped.
     pub checkpoint: Option<PathBuf>,
 }
@@ -62,6 +64,7 @@ impl Default for SolveSettings {
             effort: 1.0,
             weights: lqg::Weights::default(),
             kafaq: kafaq::Settings::default(),
+            arkaq: arkaq::Settings::default(),
             checkpoint: None,
         }
     }
@@ -100,7 +103,7 @@ pub fn solve(
     settings: &SolveSettings,
     observer: &dyn Observer,
 ) -> Result<Solution> {
-    kind.accepts_with(model, &settings.kafaq)?;
+    kind.accepts_with(model, settings)?;
     let mdp = BeliefMdp::new(model);
     if kind == SolverKind::Lqg && lqg::use_of(model) == Ok(lqg::Use::Control) {
         return control(&mdp);
@@ -125,7 +128,7 @@ pub fn solve(
             let converged = policy.converged();
             planned(kind, &mdp, policy, converged, settings)
         }
-        SolverKind::Kafaq => learned(&mdp, settings, observer),
+        SolverKind::Kafaq | SolverKind::Arkaq => learned(kind, &mdp, settings, observer),
         SolverKind::Mls => {
             let policy = MostLikelyState::solve(&mdp, &settings.states(), observer)?;
             let converged = policy.converged();
@@ -177,17 +180,33 @@ fn kbvi(mdp: &BeliefMdp, settings: &SolveSettings, observer: &dyn Observer) -> R
     })
 }
 
-/// Learned in the model's own world. The regions learned are the automaton, in whatever form it is asked for.
-fn learned(mdp: &BeliefMdp, settings: &SolveSettings, observer: &dyn Observer) -> Result<Solution> {
+/// Learned in the model's own world. What was learned is the automaton, in whatever form it is asked for.
+fn learned(
+    kind: SolverKind,
+    mdp: &BeliefMdp,
+    settings: &SolveSettings,
+    observer: &dyn Observer,
+) -> Result<Solution> {
     let model = mdp.model();
-    let own = kafaq::Settings {
-        seed: settings.seed,
-        ..settings.kafaq.clone()
-    };
+    let (seed, checkpoint) = (settings.seed, settings.checkpoint.as_deref());
     let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
-    let checkpoint = settings.checkpoint.as_deref();
-    let learned = kafaq::learn(model, &worlds, &own, checkpoint, observer)?;
-    let mut automaton = learned.automaton;
+    let (mut automaton, samples, converged, learning) = if kind == SolverKind::Arkaq {
+        let own = arkaq::Settings {
+            seed,
+            ..settings.arkaq.clone()
+        };
+        let found = arkaq::learn(model, &worlds, &own, checkpoint, observer)?;
+        let learning = Learning::Arkaq(found.learning);
+        (found.automaton, found.samples, found.converged, learning)
+    } else {
+        let own = kafaq::Settings {
+            seed,
+            ..settings.kafaq.clone()
+        };
+        let found = kafaq::learn(model, &worlds, &own, checkpoint, observer)?;
+        let learning = Learning::Kafaq(found.learning);
+        (found.automaton, found.samples, found.converged, learning)
+    };
     let compiler = settings.compiler();
     compile::annotate(&mut automaton, mdp, compiler.episodes, compiler.seed);
     Ok(Solution {
@@ -201,9 +220,9 @@ fn learned(mdp: &BeliefMdp, settings: &SolveSettings, observer: &dyn Observer) -
         planned_value: None,
         policy_convergence_horizon: None,
         levels: mdp.levels().len(),
-        samples: Some(learned.samples),
-        learning: Some(learned.learning),
-        converged: learned.converged,
+        samples: Some(samples),
+        learning: Some(learning),
+        converged,
     })
 }
 

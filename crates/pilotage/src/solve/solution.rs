@@ -1,6 +1,6 @@
 //! What a solver hands over, in the form asked for.
 
-use super::{kafaq, lqg};
+use super::{arkaq, kafaq, lqg};
 use crate::belief::Filter;
 use crate::error::{Error, Result};
 use crate::model::{Model, suggest};
@@ -55,6 +55,25 @@ impl Form {
     }
 }
 
+/// How a learner learned.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Learning {
+    /// KAFAQ: its memory, and its regions epoch by epoch.
+    Kafaq(kafaq::Learning),
+    /// ARKAQ: its clusters, and their values epoch by epoch.
+    Arkaq(arkaq::Learning),
+}
+
+impl Learning {
+    /// What was found, in words: `with ...`.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Kafaq(learning) => learning.memory.clone(),
+            Self::Arkaq(learning) => learning.describe(),
+        }
+    }
+}
+
 /// What a solver found.
 pub struct Solution {
     /// The policy.
@@ -68,7 +87,7 @@ pub struct Solution {
     /// Steps of experience used; `None` for planners.
     pub samples: Option<u64>,
     /// How learning went; `None` for planners.
-    pub learning: Option<kafaq::Learning>,
+    pub learning: Option<Learning>,
     /// Whether the solver's own test of convergence was passed.
     pub converged: bool,
 }

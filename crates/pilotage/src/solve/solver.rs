@@ -1,7 +1,7 @@
 //! The solvers by name: which there are, and what each accepts.
 
 use super::kbvi::quadratic;
-use super::{kafaq, lqg, mdp};
+use super::{SolveSettings, arkaq, kafaq, lqg, mdp};
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
 use crate::model::{Interval, Model, When, suggest};
@@ -22,17 +22,20 @@ pub enum SolverKind {
     Mls,
     /// KAFAQ-learning (thesis chapter 4).
     Kafaq,
+    /// ARKAQ-learning (thesis chapter 3).
+    Arkaq,
 }
 
 impl SolverKind {
     /// All solvers.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::KbviClosed,
         Self::Kbvi,
         Self::Lqg,
         Self::Qmdp,
         Self::Mls,
         Self::Kafaq,
+        Self::Arkaq,
     ];
 
     /// Its name, as on the command line.
@@ -44,6 +47,7 @@ impl SolverKind {
             Self::Qmdp => "qmdp",
             Self::Mls => "mls",
             Self::Kafaq => "kafaq",
+            Self::Arkaq => "arkaq",
         }
     }
 
@@ -56,6 +60,7 @@ impl SolverKind {
             Self::Qmdp => "acts as if all uncertainty were gone after this step",
             Self::Mls => "acts as if the most likely state were certain",
             Self::Kafaq => "learns regions of belief by trial, told neither map nor rewards",
+            Self::Arkaq => "learns clusters of belief by trial, with the one before as memory",
         }
     }
 
@@ -74,7 +79,7 @@ impl SolverKind {
 
     /// Whether it learns from experience, rather than plan from the model.
     pub fn learns(self) -> bool {
-        self == Self::Kafaq
+        matches!(self, Self::Kafaq | Self::Arkaq)
     }
 
     /// Whether it is made for such a model, with its default settings.
@@ -82,11 +87,11 @@ impl SolverKind {
     /// # Errors
     /// [`Error::Unsupported`] with the reason, and what would do.
     pub fn accepts(self, model: &Model) -> Result<()> {
-        self.accepts_with(model, &kafaq::Settings::default())
+        self.accepts_with(model, &SolveSettings::default())
     }
 
     /// As [`SolverKind::accepts`], for a learner with these settings.
-    pub(super) fn accepts_with(self, model: &Model, settings: &kafaq::Settings) -> Result<()> {
+    pub(super) fn accepts_with(self, model: &Model, settings: &SolveSettings) -> Result<()> {
         let reason = match self {
             Self::Kbvi => reward_missing(model).or_else(|| pays_afterwards(model)),
             Self::KbviClosed if quadratic::suits(model) => {
@@ -98,10 +103,11 @@ impl SolverKind {
                 .or_else(|| pays_afterwards(model))
                 .or_else(|| bound_missing(model))
                 .or_else(|| too_many_variables(model)),
-            Self::Kafaq => reward_missing(model),
+            Self::Kafaq | Self::Arkaq => reward_missing(model),
         };
         match reason {
-            None if self == Self::Kafaq => kafaq::accepts(model, settings),
+            None if self == Self::Kafaq => kafaq::accepts(model, &settings.kafaq),
+            None if self == Self::Arkaq => arkaq::accepts(model, &settings.arkaq),
             None => Ok(()),
             Some(reason) => Err(Error::Unsupported {
                 solver: self.name(),

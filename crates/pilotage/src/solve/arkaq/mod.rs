@@ -37,6 +37,7 @@ use crate::model::{ActionId, Model};
 use crate::observe::Observer;
 use crate::policy::Automaton;
 use crate::solve::learn::{Experience, critical, undiscounted};
+use crate::world::{ProblemWorld, World};
 use draft::Draft;
 use policy::Policy;
 use task::Task;
@@ -49,16 +50,39 @@ pub struct Learned {
     pub automaton: Automaton,
     /// Whether no new clusters were found and the best actions had stopped changing.
     pub converged: bool,
-    /// Whether the world model is incomplete because it reached [`Settings::cluster_limit`].
-    pub capped: bool,
     /// Steps of experience, trials included.
     pub samples: u64,
+    /// How learning went.
+    pub learning: Learning,
+}
+
+/// How learning went.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Learning {
+    /// Whether the world model is incomplete because it reached [`Settings::cluster_limit`].
+    pub capped: bool,
     /// Vigilance of the network.
     pub vigilance: f64,
     /// Clusters of the world model, before any were merged.
     pub clusters: Vec<ClusterFound>,
     /// How learning went, epoch by epoch, at all vigilances tried.
     pub curve: Vec<Point>,
+}
+
+impl Learning {
+    /// What was found, in words.
+    pub fn describe(&self) -> String {
+        let cap = if self.capped {
+            ", stopped by `cluster_limit`"
+        } else {
+            ""
+        };
+        format!(
+            "{} clusters at vigilance {}{cap}",
+            self.clusters.len(),
+            self.vigilance
+        )
+    }
 }
 
 /// A cluster of the world model.
@@ -83,6 +107,15 @@ pub struct Point {
     pub reward: f64,
     /// By cluster: the best action and its value.
     pub clusters: Vec<(ActionId, f64)>,
+}
+
+/// Whether a model can be learned with these settings.
+///
+/// # Errors
+/// As [`learn`].
+pub fn accepts(model: &Model, settings: &Settings) -> Result<()> {
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+    Task::new(model, settings.clone(), &worlds).map(drop)
 }
 
 /// Learns an automaton in the worlds that `worlds` makes, of which `model` tells no more than the agent knows of itself.
@@ -260,11 +293,13 @@ impl<'a> Run<'a> {
         Learned {
             automaton: best.draft.compile(&self.task),
             converged: best.converged,
-            capped: best.world.capped,
             samples: state.experience.samples,
-            vigilance: best.world.vigilance,
-            clusters: best.world.clusters(),
-            curve: state.curve.clone(),
+            learning: Learning {
+                capped: best.world.capped,
+                vigilance: best.world.vigilance,
+                clusters: best.world.clusters(),
+                curve: state.curve.clone(),
+            },
         }
     }
 }

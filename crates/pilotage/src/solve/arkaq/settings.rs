@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::solve::learn::{Rates, ensure};
+use crate::solve::learn::{Rates, ensure, set};
 
 /// Settings of ARKAQ-learning. Lengths are shares of the world, rewards shares of the range of the rewards that were met, so that the
 /// defaults do not depend on a problem's units.
@@ -128,6 +128,15 @@ impl Settings {
             power: self.rate_power,
             floor: self.rate_floor,
         }
+    }
+
+    /// Sets one of them by name to a value written as in JSON. Ranges are left to [`Settings::validate`].
+    ///
+    /// # Errors
+    /// [`crate::Error::Unknown`] for a name that is none, [`crate::Error::Setting`] for a value of another kind than the setting's.
+    pub fn set(&mut self, name: &str, value: &str) -> Result<()> {
+        *self = set(self, name, value)?;
+        Ok(())
     }
 
     /// Checks every setting against its range.

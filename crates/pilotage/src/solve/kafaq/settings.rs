@@ -2,9 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
-use crate::model::suggest;
-use crate::solve::learn::{Rates, ensure};
+use crate::error::Result;
+use crate::solve::learn::{Rates, ensure, set};
 
 /// How regions change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -128,26 +127,9 @@ impl Settings {
     /// Sets one of them by name to a value written as in JSON; words need no quotes. Ranges are left to [`Settings::validate`].
     ///
     /// # Errors
-    /// [`Error::Unknown`] for a name that is none, [`Error::Setting`] for a value of another kind than the setting's.
+    /// [`crate::Error::Unknown`] for a name that is none, [`crate::Error::Setting`] for a value of another kind than the setting's.
     pub fn set(&mut self, name: &str, value: &str) -> Result<()> {
-        let wrong = |value: String| Error::Setting {
-            setting: "a setting of kafaq",
-            value,
-            range: "a value of the kind that it has by default",
-        };
-        let mut all = serde_json::to_value(&*self).map_err(|error| wrong(error.to_string()))?;
-        let Some(slot) = all.get_mut(name) else {
-            let known = all.as_object().into_iter().flat_map(|all| all.keys());
-            return Err(Error::Unknown {
-                what: "setting of kafaq",
-                name: name.to_owned(),
-                hint: suggest(name, known.map(String::as_str)),
-            });
-        };
-        let default = slot.to_string();
-        *slot = serde_json::from_str(value).unwrap_or_else(|_| value.into());
-        *self = serde_json::from_value(all)
-            .map_err(|_| wrong(format!("{name}={value} (it is {default})")))?;
+        *self = set(self, name, value)?;
         Ok(())
     }
 

@@ -9,7 +9,7 @@ mod table;
 mod trial;
 
 pub(super) use actor::{Actor, known};
-pub(super) use ensure::ensure;
+pub(super) use ensure::{ensure, set};
 pub(super) use experience::Experience;
 pub(super) use table::{Rates, Table, Transition, any_action, boltzmann};
 pub(super) use trial::{Trial, critical, discounted, run_trial, undiscounted};
