@@ -51,9 +51,7 @@ fn algorithms(out: &mut String, algorithms: &[Algorithm]) {
             &algorithm.gap,
         ]
     });
-    row(out, &columns);
-    out.push_str(&"|---".repeat(columns.len()));
-    out.push_str("|\n");
+    head(out, &columns);
     rows.for_each(|cells| row(out, &cells));
 }
 
@@ -74,9 +72,7 @@ fn section(out: &mut String, finding: &Finding, figures: &str, files: &mut Vec<(
     } in &finding.tables
     {
         let _ = writeln!(out, "\nTable: {}\n", plain(caption));
-        row(out, columns);
-        out.push_str(&"|---".repeat(columns.len()));
-        out.push_str("|\n");
+        head(out, columns);
         rows.iter().for_each(|cells| row(out, cells));
     }
     let names = numbered(&finding.id, finding.figures.len(), "svg");
@@ -88,6 +84,11 @@ fn section(out: &mut String, finding: &Finding, figures: &str, files: &mut Vec<(
         );
         files.push((name, figure.svg.clone()));
     }
+}
+
+fn head(out: &mut String, columns: &[impl AsRef<str>]) {
+    row(out, columns);
+    let _ = writeln!(out, "{}|", "|---".repeat(columns.len()));
 }
 
 fn row(out: &mut String, cells: &[impl AsRef<str>]) {

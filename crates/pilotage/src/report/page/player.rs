@@ -39,7 +39,7 @@ pub fn player(recording: &Recording) -> Markup {
                 @if modes { div { dt { "truly" } dd data-show="mode" {} } div { dt { "believed" } dd data-show="believed" {} } }
             }
             p.nodes-head id={ (id) "-nodes" } { "The automaton's nodes, with the action of each:" }
-            ol.nodes aria-labelledby={ (id) "-nodes" } {
+            ol.nodes tabindex="0" aria-labelledby={ (id) "-nodes" } {
                 @for node in &recording.nodes { li { (node) } }
             }
             script type="application/json" { (PreEscaped(json(recording))) }

@@ -206,10 +206,14 @@ class Player {
       believed: frame.hypotheses[frame.valid]?.mode ?? "",
     };
     for (const place of this.root.querySelectorAll("[data-show]")) place.textContent = words[place.dataset.show];
-    this.root.querySelectorAll(".nodes li").forEach((node, id) => {
-      if (id === frame.node) node.setAttribute("aria-current", "step");
-      else node.removeAttribute("aria-current");
-    });
+    const nodes = this.root.querySelector(".nodes");
+    nodes.querySelector("[aria-current]")?.removeAttribute("aria-current");
+    const current = nodes.children[frame.node];
+    if (current) {
+      current.setAttribute("aria-current", "step");
+      // `scrollIntoView` would scroll the page as well.
+      nodes.scrollTop = current.offsetTop - (nodes.clientHeight - current.offsetHeight) / 2;
+    }
     this.draw();
   }
 
