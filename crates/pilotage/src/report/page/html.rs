@@ -149,9 +149,15 @@ fn badge(verdict: Verdict) -> Markup {
 fn drawn(table: &Table) -> Markup {
     let is_number = |column: usize| {
         let cells = table.rows.iter().filter_map(|row| row.get(column));
-        cells
-            .map(|cell| cell.trim_start_matches(['-', '−', '+', '<', '>', '≤', '≥', ' ']))
-            .all(|cell| cell.is_empty() || cell.starts_with(|c: char| c.is_ascii_digit()))
+        let mut written = cells
+            .map(|cell| cell.trim())
+            .filter(|cell| !cell.is_empty());
+        let signs = ['-', '−', '+', '<', '>', '≤', '≥', ' '];
+        let starts_with_digit = |cell: &str| {
+            cell.trim_start_matches(signs)
+                .starts_with(|c: char| c.is_ascii_digit())
+        };
+        written.clone().count() > 0 && written.all(starts_with_digit)
     };
     let classes: Vec<Option<&str>> = (0..table.columns.len())
         .map(|column| is_number(column).then_some("number"))

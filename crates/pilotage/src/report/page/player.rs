@@ -24,6 +24,9 @@ pub fn player(recording: &Recording) -> Markup {
                     li { (sign(html! { path.belief d="M0 15 C6 15 6 2 10 2 S14 15 20 15 Z" {} })) "belief" }
                 }
                 li { (sign(html! { rect.place x="2" y="1" width="16" height="14" {} })) "place that pays" }
+                @if !recording.blocked.is_empty() {
+                    li { (sign(html! { rect.blocked x="2" y="1" width="16" height="14" {} })) "wall" }
+                }
             }
             div.controls {
                 button type="button" data-do="play" { "Play" }
