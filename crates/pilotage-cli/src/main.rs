@@ -6,6 +6,7 @@ mod failure;
 mod list;
 mod options;
 mod progress;
+mod reproduce;
 mod simulate;
 mod solve;
 mod summary;
@@ -29,11 +30,13 @@ enum Verb {
     /// Read a model file and say what it describes, or what is wrong with it and where.
     Check(check::Arguments),
     /// Find a policy for a problem, and measure what it earns.
-    Solve(solve::Arguments),
+    Solve(Box<solve::Arguments>),
     /// Run a saved policy and measure what it earns.
     Simulate(simulate::Arguments),
     /// Draw a saved policy: its automaton and its map of beliefs, as SVG.
     Draw(draw::Arguments),
+    /// Make every table and figure of the thesis again, with a verdict on each.
+    Reproduce(reproduce::Arguments),
 }
 
 fn main() -> std::process::ExitCode {
@@ -43,6 +46,7 @@ fn main() -> std::process::ExitCode {
         Verb::Solve(arguments) => solve::run(&arguments),
         Verb::Simulate(arguments) => simulate::run(&arguments),
         Verb::Draw(arguments) => draw::run(&arguments),
+        Verb::Reproduce(arguments) => reproduce::run(&arguments),
     };
     match outcome {
         Ok(()) => std::process::ExitCode::SUCCESS,

@@ -34,13 +34,16 @@ impl Evaluation {
 
     /// Limits the threads of everything that follows.
     pub fn start_threads(&self) -> Result<(), Failure> {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(self.threads)
-            .build_global()
-            .map_err(|error| {
-                Failure::Usage(format!("cannot start {} threads: {error}", self.threads))
-            })
+        start_threads(self.threads)
     }
+}
+
+/// Limits the threads of everything that follows; 0 uses every core.
+pub fn start_threads(threads: usize) -> Result<(), Failure> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global()
+        .map_err(|error| Failure::Usage(format!("cannot start {threads} threads: {error}")))
 }
 
 /// A whole number above 0.

@@ -22,6 +22,13 @@ impl Bars {
     }
 }
 
+impl Bars {
+    /// Says which part of a long run is being made.
+    pub fn chapter(&self, name: &str, done: usize, of: usize) {
+        self.note(&format!("{:>3} of {of}: {name}", done + 1));
+    }
+}
+
 impl Observer for Bars {
     fn progress(&self, stage: &'static str, done: u64, total: u64) {
         if self.quiet {
@@ -45,6 +52,14 @@ impl Observer for Bars {
         }
     }
 
+    fn status(&self, message: &str) {
+        if let Ok(current) = self.current.lock()
+            && let Some((_, bar)) = current.as_ref()
+        {
+            bar.set_prefix(message.to_owned());
+        }
+    }
+
     fn note(&self, message: &str) {
         if self.quiet {
             return;
@@ -64,7 +79,7 @@ impl Observer for Bars {
 
 fn bar(stage: &'static str, total: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
-    let template = "{msg:>10} [{bar:30}] {human_pos}/{human_len}  {eta} left";
+    let template = "{msg:>10} [{bar:30}] {human_pos}/{human_len}  {eta} left  {prefix}";
     bar.set_style(
         ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
     );

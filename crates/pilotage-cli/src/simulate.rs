@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::Args;
 use pilotage::belief::BeliefMdp;
-use pilotage::model::Model;
+use pilotage::model::{self, Model};
 use pilotage::policy::{Automaton, Controller};
 use pilotage::simulate::evaluate;
 use pilotage::simulate::wake_up::{Settings, measure};
@@ -24,6 +24,9 @@ pub struct Arguments {
     /// A policy file written by `pilotage solve --out`.
     #[arg(long)]
     policy: PathBuf,
+    /// Act in the world of another model with the same actions and sensor, such as robot-basic for a policy of basic.
+    #[arg(long, value_name = "PROBLEM", conflicts_with = "wake_up")]
+    world: Option<String>,
     /// Carry the robot to one of its start places, tell it so, and let it find out which (models with several starts).
     #[arg(long)]
     wake_up: bool,
@@ -41,9 +44,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.wake_up {
         return wake_up(arguments, &model, &automaton, &bars);
     }
+    let world = match &arguments.world {
+        None => model,
+        Some(world) => {
+            let world = model::find(world)?;
+            automaton.check_world(&world, &arguments.policy.display().to_string())?;
+            world
+        }
+    };
     let clock = Instant::now();
     let evaluation = evaluate(
-        &model,
+        &world,
         &automaton.filter,
         &Controller::new(&automaton),
         arguments.evaluation.options(),
@@ -53,6 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     if arguments.json {
         let mut report = identity(&automaton, arguments.evaluation.seed);
+        report["world"] = json!(world.name);
         report["planned_value"] = json!(automaton.planned_value);
         report["evaluation"] = json!(evaluation);
         report["seconds"] = json!({ "evaluate": seconds });
@@ -61,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         writeln!(
             out,
             "{}",
-            summary::heading(&model.name, &automaton.solver, Some(automaton.nodes.len()))
+            summary::heading(&world.name, &automaton.solver, Some(automaton.nodes.len()))
         )?;
         write!(
             out,

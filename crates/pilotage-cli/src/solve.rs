@@ -6,14 +6,17 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use pilotage::model::{self, Model, WallBelief, Walls};
+use pilotage::policy::write_whole;
+use pilotage::report::{returns_svg, values_svg};
 use pilotage::simulate::Evaluation as Earned;
+use pilotage::solve::kafaq;
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
 use pilotage::solve::lqg::Weights;
 use pilotage::solve::{Form, Solution, SolveSettings, SolverKind, solve};
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::options::{Evaluation, at_least_one};
+use crate::options::{Evaluation, at_least_one, beside};
 use crate::progress::Bars;
 use crate::summary;
 
@@ -37,6 +40,68 @@ pub struct Arguments {
     evaluation: Evaluation,
     #[command(flatten)]
     planner: Planner,
+    #[command(flatten)]
+    learner: Learner,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Learner settings")]
+struct Learner {
+    /// Keep the state of learning in this file, and go on from there if it exists.
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+    /// Draw how learning went: FILE-returns.svg and FILE-values.svg.
+    #[arg(long, value_name = "FILE")]
+    curves: Option<PathBuf>,
+    /// A setting of the learner by name, such as lambda=0.5; may be given more than once.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
+    learn: Vec<(String, String)>,
+}
+
+fn key_and_value(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text
+        .split_once('=')
+        .ok_or_else(|| format!("`{text}` is not KEY=VALUE, such as lambda=0.5"))?;
+    Ok((key.trim().to_owned(), value.trim().to_owned()))
+}
+
+impl Learner {
+    /// As the library wants them, with the seed of the run.
+    fn settings(&self, seed: u64) -> Result<kafaq::Settings, Failure> {
+        let mut settings = kafaq::Settings::default();
+        for (key, value) in &self.learn {
+            if key == "seed" {
+                return Err(Failure::Usage("the seed is set by --seed".to_owned()));
+            }
+            settings.set(key, value)?;
+        }
+        Ok(kafaq::Settings { seed, ..settings })
+    }
+
+    /// Whether any of it was asked for.
+    fn is_given(&self) -> bool {
+        self.checkpoint.is_some() || self.curves.is_some() || !self.learn.is_empty()
+    }
+
+    /// Draws the curves that were asked for; returns their files.
+    fn draw(&self, solution: &Solution) -> Result<Vec<PathBuf>, Failure> {
+        let (Some(path), Some(learning), Some(automaton)) =
+            (&self.curves, &solution.learning, solution.automaton())
+        else {
+            return Ok(Vec::new());
+        };
+        let pictures = [
+            ("returns.svg", returns_svg(automaton, learning)?),
+            ("values.svg", values_svg(automaton, learning)?),
+        ];
+        let mut files = Vec::new();
+        for (suffix, picture) in pictures {
+            let file = beside(path, suffix);
+            write_whole(&file, picture.as_bytes())?;
+            files.push(file);
+        }
+        Ok(files)
+    }
 }
 
 #[derive(Args)]
@@ -122,6 +187,8 @@ impl Arguments {
                 state: self.planner.state_weights.clone(),
                 control: self.planner.control_weights.clone(),
             },
+            kafaq: self.learner.settings(self.evaluation.seed)?,
+            checkpoint: self.learner.checkpoint.clone(),
         })
     }
 }
@@ -135,6 +202,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 .to_owned(),
         ));
     }
+    if arguments.learner.is_given() && !solver.learns() {
+        return Err(Failure::Usage(format!(
+            "{} plans; --checkpoint, --curves and --learn are for learners, such as --with kafaq",
+            solver.name()
+        )));
+    }
     let model = model::find(&arguments.problem)?;
     arguments.evaluation.start_threads()?;
     let bars = Bars::new(arguments.json);
@@ -145,6 +218,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let (Some(path), Some(automaton)) = (&arguments.out, solution.automaton()) {
         automaton.save(path)?;
     }
+    let curves = arguments.learner.draw(&solution)?;
     let clock = Instant::now();
     let earned = solution.evaluate(&model, arguments.evaluation.options(), &bars);
     let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
@@ -162,6 +236,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "{}",
             shown(arguments, &model, solver, &solution, &earned, seconds)
         )?;
+        for file in curves {
+            writeln!(out, "  {}", file.display())?;
+        }
     }
     Ok(())
 }
@@ -178,7 +255,7 @@ fn report(
         "pilotage": env!("CARGO_PKG_VERSION"),
         "problem": model.name,
         "solver": solver.name(),
-        "policy": arguments.policy,
+        "policy": solution.automaton().map_or(json!(arguments.policy), |automaton| json!(automaton.matching)),
         "seed": arguments.evaluation.seed,
         "converged": solution.converged,
         "policy_convergence_horizon": solution.policy_convergence_horizon,
@@ -209,6 +286,12 @@ fn shown(
     }
     if let Some(horizon) = solution.policy_convergence_horizon {
         lines.push(format!("  policy convergence horizon {horizon}"));
+    }
+    if let (Some(learning), Some(samples)) = (&solution.learning, solution.samples) {
+        lines.push(format!(
+            "  learned in {samples} steps, with {}",
+            learning.memory
+        ));
     }
     if !solution.converged {
         lines.push("  not converged: the policy still changes with more work; see --help for what can be raised".to_owned());

@@ -66,7 +66,7 @@ pub fn nodes(automaton: &Automaton) -> String {
     if modes {
         header.push("mode");
     }
-    let place = automaton.states.join(", ");
+    let place = automaton.place_names().join(", ");
     header.extend([place.as_str(), "action", "value", "time", "reached from"]);
     table.set_header(header);
     for (id, node) in automaton.nodes.iter().enumerate().take(ROWS) {

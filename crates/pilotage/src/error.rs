@@ -60,6 +60,16 @@ pub enum Error {
         /// What is allowed.
         range: &'static str,
     },
+    /// Numbers shown to a network that it cannot take.
+    #[error("{place} = {value} is refused: {reason}")]
+    Input {
+        /// Which number.
+        place: String,
+        /// The number.
+        value: String,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The problem needs more memory than is allowed.
     #[error(
         "{model} needs a grid of {points} points ({mebibytes} MiB), more than the {limit} MiB allowed; raise --memory or make the grid coarser with --grid"

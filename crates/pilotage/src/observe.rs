@@ -8,6 +8,11 @@ pub trait Observer: Sync {
         let _ = (stage, done, total);
     }
 
+    /// How the work stands now, in a few words that replace the last ones.
+    fn status(&self, message: &str) {
+        let _ = message;
+    }
+
     /// Something worth a sentence happened.
     fn note(&self, message: &str) {
         let _ = message;

@@ -157,6 +157,33 @@ const MISTAKES: &[Mistake] = &[
     row("load-unload", "mode = \"loaded\"", "mode = \"full\"", "\"full\"", "unknown mode `full`", "`empty`"),
     row("load-unload", "in = { x = [4.0, 5.0] }", "in = \"u\"", "\"u\"", "this model has no map", "add a [map]"),
     row("corridor", "[world]", "[map]\ncell = 1.0\nrows = \"..\"\n[world]", "[\"x\"]", "a map has two directions", "two state variables"),
+    // The robot and its arena.
+    row("robot-basic", "kind = \"robot\"", "kind = \"robots\"", "\"robots\"", "unknown value `robots`", "`robot`"),
+    row("robot-basic", "kind = \"robot\"", "walls = \"clamp\"", "robot]", "nothing uses", "`kind = \"robot\"`"),
+    row("basic", "walls = \"clamp\"", "kind = \"robot\"", "\"robot\"", "the parameters of the robot are missing", "[world.robot]"),
+    row("robot-basic", "radius = 0.05", "", "[world.robot]", "`radius` is missing", "add `radius`"),
+    row("robot-basic", "radius = 0.05", "radius = 0.05\ncolour = 3", "colour", "unknown key `colour`", "known here"),
+    row("robot-basic", "cell = 0.25", "cell = 0.0", "0.0 # m\nradius", "this is 0", "more than 0"),
+    row("robot-basic", "speed = 0.15", "speed = -1.0", "-1.0 # m/s", "this is -1", "more than 0"),
+    row("robot-basic", "tick = 0.032", "tick = 0.0", "0.0 # s", "this is 0", "more than 0"),
+    row("robot-basic", "slip = 0.3", "slip = -0.3", "-0.3", "this is -0.3", "0 or more"),
+    row("robot-basic", "compass_noise = 0.02", "compass_noise = nan", "nan", "not a number", "finite"),
+    row("robot-basic", "axle = 0.08", "axle = 0.2", "0.2 # m", "wheels 0.2 m apart", "twice the radius"),
+    row("robot-basic", "radius = 0.05", "radius = 0.2", "0.2 # m", "does not fit an arena 0.25 m wide", "make it smaller"),
+    row("robot-basic", "radius = 0.05", "radius = 0.42\nhallway = 2.0", "0.42", "the robot cannot move", "make it smaller"),
+    row("robot-basic", "range = 1.0", "range = 0.3", "0.3 # m", "sees no wall", "at least 0.45"),
+    row("robot-basic", "uniform = { x = [0.0, 4.0] }", "mean = [0.1]\ncovariance = [[0.1]]", "[0.1]\ncov", "stand in a wall", "between 0.2 and 3.8"),
+    row("robot-basic", "H = [[1.0]]", "H = [[2.0]]", "\"robot\" # two", "its place", "identity"),
+    row("robot-basic", "bounds = [[0.0, 4.0]]", "", "\"robot\" # two", "no wall along x", "finite `bounds`"),
+    // When rewards are paid, uniform starts, true motion.
+    row("basic", "when = \"after\"", "when = \"later\"", "\"later\"", "unknown value `later`", "`after`"),
+    row("cart-load-unload", "when = \"after\"", "when = 1", "1\nmode", "unexpected value", "string"),
+    row("basic", "uniform = { x = [0.0, 4.0] }", "uniform = { y = [0.0, 4.0] }", "y = ", "`y`", "`x`"),
+    row("basic", "uniform = { x = [0.0, 4.0] }", "uniform = { x = [4.0, 0.0] }", "[4.0, 0.0]", "4", "lower"),
+    row("maze-4x4", "uniform = { x = [0.0, 4.0], y = [0.0, 4.0] }", "uniform = { x = [0.0, 4.0] }", "{ x", "y", "y"),
+    row("basic", "uniform = { x = [0.0, 4.0] }", "uniform = { x = [0.0, 4.0] }\nmean = [1.0]", "mean", "uniform", "uniform"),
+    row("basic", "uniform = { x = [0.0, 4.0] }", "uniform = { x = [-inf, 4.0] }", "[-inf", "is no box", "two numbers"),
+    row("shuttle", "[[world.motion.control]]", "[[world.motion.controls]]", "controls", "unknown key `controls`", "`control`"),
 ];
 
 fn error_of(text: &str) -> ModelError {

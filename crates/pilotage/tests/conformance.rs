@@ -8,6 +8,7 @@ use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller, Policy};
 use pilotage::random::{Rng, Role, normal, stream};
 use pilotage::simulate::Options;
+use pilotage::solve::kafaq;
 use pilotage::solve::{Form, Solution, SolveSettings, Solved, SolverKind, rollout, solve};
 
 /// Settings small enough for a test of all pairs; what is found need not be good.
@@ -22,6 +23,14 @@ fn small(model: &Model, form: Form) -> SolveSettings {
         horizons: 1..=2,
         runs: Some(20),
         effort: 1e-3,
+        kafaq: kafaq::Settings {
+            epoch: 500,
+            epoch_per_cell: 1,
+            epoch_limit: 2,
+            cells_along: 8,
+            trial: 10,
+            ..Default::default()
+        },
         ..Default::default()
     }
 }
@@ -48,10 +57,10 @@ fn bounds(model: &Model) -> (f64, f64) {
 }
 
 /// Beliefs at every level and mode, in and around the bounds.
-fn beliefs(mdp: &BeliefMdp, rng: &mut Rng) -> Vec<Belief> {
+fn beliefs(mdp: &BeliefMdp, modes: usize, rng: &mut Rng) -> Vec<Belief> {
     let model = mdp.model();
     let mut beliefs = Vec::new();
-    for mode in 0..model.modes.len() {
+    for mode in 0..modes {
         for level in 0..mdp.levels().len() {
             for _ in 0..20 {
                 let mean = model.state.iter().map(|variable| {
@@ -70,7 +79,8 @@ fn beliefs(mdp: &BeliefMdp, rng: &mut Rng) -> Vec<Belief> {
 }
 
 fn check_policy(mdp: &BeliefMdp, policy: &dyn Policy, what: &str) {
-    for belief in beliefs(mdp, &mut stream(1, 0, Role::Planner)) {
+    let modes = mdp.model().modes.len();
+    for belief in beliefs(mdp, modes, &mut stream(1, 0, Role::Planner)) {
         let action = policy.action(&belief);
         assert!(
             action < mdp.model().actions.len(),
@@ -89,7 +99,9 @@ fn check_automaton(mdp: &BeliefMdp, automaton: &Automaton, what: &str) {
     );
 
     let controller = Controller::new(automaton);
-    for belief in beliefs(mdp, &mut stream(2, 0, Role::Planner)) {
+    // A learner has memories in place of modes.
+    let modes = automaton.modes.len();
+    for belief in beliefs(mdp, modes, &mut stream(2, 0, Role::Planner)) {
         assert_eq!(
             controller.action(&belief),
             automaton.action(&belief),

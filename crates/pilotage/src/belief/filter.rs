@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::levels::{LevelGraph, LevelId};
+use super::recall::Recall;
 use crate::model::{ActionId, Barriers, ModeId, Model, Region, WallBelief, When};
 
 /// What the agent knows: an uncertainty level, the mean at that level, and the hidden mode it takes to be the case.
@@ -67,6 +68,9 @@ pub struct Filter {
     switches: Vec<Switch>,
     /// The walls, where the belief knows of them.
     walls: Option<Barriers>,
+    /// Where it decides on modes, instead of the switches.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    recall: Option<Recall>,
 }
 
 impl Filter {
@@ -123,13 +127,26 @@ impl Filter {
             actions,
             switches,
             walls: (model.belief.walls == WallBelief::Clip).then(|| Barriers::new(model)),
+            recall: None,
         }
+    }
+
+    /// The same filter with modes that are clusters, from the start on.
+    pub fn recalling(mut self, recall: Recall) -> Self {
+        self.start.1 = recall.first(&self.start.2);
+        self.recall = Some(recall);
+        self
     }
 
     /// The same filter with another start; its level is one of the same level graph.
     pub fn starting_at(mut self, start: &Belief) -> Self {
         self.start = (start.level, start.mode, start.mean.clone());
         self
+    }
+
+    /// The clusters that are its modes, where they are.
+    pub fn recall(&self) -> Option<&Recall> {
+        self.recall.as_ref()
     }
 
     /// The belief before anything was observed.
@@ -175,6 +192,10 @@ impl Filter {
                 .walls
                 .as_ref()
                 .is_none_or(|walls| walls.fits(self.states))
+            && self
+                .recall
+                .as_ref()
+                .is_none_or(|recall| recall.fits(self.states, actions, modes))
     }
 
     /// Number of state variables.
@@ -211,6 +232,10 @@ impl Filter {
             walls.confine(&mut belief.mean);
         }
         belief.level = self.next[edge];
+        if let Some(recall) = &self.recall {
+            belief.mode = recall.next(belief.mode, action, &belief.mean);
+            return;
+        }
         let becomes = before.or_else(|| self.switch(When::After, belief, action));
         belief.mode = becomes.unwrap_or(belief.mode);
     }

@@ -6,6 +6,7 @@ pub mod hypotheses;
 pub mod kalman;
 pub mod levels;
 pub mod mdp;
+pub mod recall;
 pub mod riccati;
 
 pub use filter::{Belief, Filter, Switch};
@@ -13,3 +14,4 @@ pub use hypotheses::{Hypothesis, Merge, Tracker, Tracking};
 pub use kalman::{Correction, KalmanFilter};
 pub use levels::{ClassId, LevelGraph, LevelId};
 pub use mdp::BeliefMdp;
+pub use recall::{Cluster, Recall, Sight};

@@ -33,6 +33,9 @@ const MODELS: &[(&str, &str)] = models![
     "cart-load-unload",
     "stations-5x5",
     "shuttle",
+    "robot-basic",
+    "robot-maze-4x4",
+    "robot-cart-load-unload",
 ];
 
 /// Names of the built-in models.

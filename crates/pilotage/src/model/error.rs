@@ -115,7 +115,7 @@ impl Fault {
 }
 
 /// A hint towards the known name that is nearest to `name`, or a list of all known ones.
-pub(crate) fn suggest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+pub fn suggest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known
         .into_iter()
         .filter(|known| !known.is_empty())

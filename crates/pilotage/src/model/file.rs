@@ -5,7 +5,7 @@ use schemars::{JsonSchema, Schema};
 use serde::Deserialize;
 
 use super::file_value::{Ends, Named, OneOrMany, Sides, Where};
-use super::{CartPole, HypothesisBelief, Then, WallBelief, Walls, When};
+use super::{CartPole, HypothesisBelief, Robot, Then, WallBelief, Walls, When};
 
 /// Rows of numbers: `[[1.0, 0.0], [0.0, 1.0]]`.
 pub(super) type Rows = Vec<Vec<f64>>;
@@ -265,6 +265,8 @@ pub(super) struct WorldTable {
     /// Parameters of the cart and pole, needed by `kind = "cart-pole"` and by `motion.linearise`.
     #[serde(rename = "cart-pole")]
     pub cart_pole: Option<CartPole>,
+    /// Parameters of the robot, needed by `kind = "robot"`.
+    pub robot: Option<Robot>,
 }
 
 /// The true linear motion.
@@ -299,4 +301,6 @@ pub(super) enum Kind {
     Linear,
     /// The nonlinear cart and pole, with the parameters of `world.cart-pole`.
     CartPole,
+    /// A two-wheeled robot with range finders in an arena with walls at `state.bounds`, with the parameters of `world.robot`.
+    Robot,
 }

@@ -15,6 +15,7 @@ mod map;
 mod read;
 mod region;
 mod resolve;
+mod robot;
 mod validate;
 
 use nalgebra::{DMatrix, DVector};
@@ -23,12 +24,12 @@ use serde::{Deserialize, Serialize};
 
 pub use barriers::Barriers;
 pub use builtin::{builtin, find, names};
-pub(crate) use error::suggest;
-pub use error::{Fault, ModelError, Path, Place, Step};
+pub use error::{Fault, ModelError, Path, Place, Step, suggest};
 pub use file::schema;
 pub use map::Map;
 pub use read::{load, read};
 pub use region::{Interval, Region};
+pub use robot::Robot;
 
 /// Index into [`Model::actions`].
 pub type ActionId = usize;
@@ -327,6 +328,8 @@ pub enum WorldKind {
     Linear,
     /// The nonlinear cart and pole of Eq. 3.6 and 3.9.
     CartPole(CartPole),
+    /// A two-wheeled robot in a walled arena.
+    Robot(Robot),
 }
 
 /// Parameters of the cart and pole, Table 3.1. State: position m, velocity m/s, angle from upright rad, rad/s.

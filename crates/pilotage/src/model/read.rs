@@ -128,6 +128,10 @@ fn in_our_words(error: &toml::de::Error) -> (std::ops::Range<usize>, String, Str
                 format!("write {}", expected_in_plain_words(expected)),
             )
         }
+        // A word of a list of words was wanted.
+        _ if message.starts_with("wanted string") => {
+            ("unexpected value".to_owned(), "write a string".to_owned())
+        }
         _ => (
             message.to_owned(),
             "this is not TOML; see https://toml.io".to_owned(),

@@ -538,6 +538,24 @@ fn saturating(count: u64) -> usize {
 
 fn world_kind(file: &ModelFile) -> Result<WorldKind, Fault> {
     let path = Path::new("world");
+    match (file.world.kind, &file.world.robot) {
+        (Kind::Robot, Some(robot)) => return Ok(WorldKind::Robot(robot.clone())),
+        (Kind::Robot, None) => {
+            return Err(Fault::new(
+                path.key("kind"),
+                "the parameters of the robot are missing",
+                "add a table [world.robot]",
+            ));
+        }
+        (_, Some(_)) => {
+            return Err(Fault::of_key(
+                path.key("robot"),
+                "nothing uses these parameters",
+                "add `kind = \"robot\"` to [world], or delete this table",
+            ));
+        }
+        (_, None) => {}
+    }
     match (file.world.kind, &file.world.cart_pole) {
         (Kind::CartPole, Some(parameters)) => Ok(WorldKind::CartPole(parameters.clone())),
         (Kind::CartPole, None) => Err(no_cart_pole(path.key("kind"))),
@@ -546,6 +564,6 @@ fn world_kind(file: &ModelFile) -> Result<WorldKind, Fault> {
             "nothing uses these parameters",
             "add `kind = \"cart-pole\"` to [world], or delete this table",
         )),
-        (Kind::Linear, _) => Ok(WorldKind::Linear),
+        (Kind::Linear | Kind::Robot, _) => Ok(WorldKind::Linear),
     }
 }

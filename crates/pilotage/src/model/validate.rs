@@ -6,7 +6,8 @@ use nalgebra::DVector;
 
 use super::error::{Fault, Path};
 use super::*;
-use numbers::{covariance, finite, finite_matrix, positive, shape, vector};
+pub(super) use numbers::positive;
+use numbers::{covariance, finite, finite_matrix, shape, vector};
 
 /// Weights of hypotheses may miss 1 by this much, which decimals such as 0.333333333 need.
 const WEIGHT_TOLERANCE: f64 = 1e-6;
@@ -348,6 +349,9 @@ impl Model {
                     "name position, velocity, angle and angular velocity, in this order",
                 ));
             }
+        }
+        if let WorldKind::Robot(robot) = &self.world.kind {
+            robot.validate(self)?;
         }
         let unbounded = self
             .state

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::belief::{Belief, BeliefMdp, Filter, LevelId};
 use crate::model::{ActionId, ModeId};
-use crate::policy::Policy;
+use crate::policy::{Coordinates, Policy};
 
 /// Index into [`Automaton::nodes`].
 pub type NodeId = usize;
@@ -32,7 +32,10 @@ pub struct Automaton {
     pub levels: Vec<Vec<f64>>,
     /// Return expected from the start, where the solver knows.
     pub planned_value: Option<f64>,
-    /// Scale of each state variable when distances are measured; 1 leaves it.
+    /// Coordinates in which places are stated; `None` for the state variables themselves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coordinates: Option<Coordinates>,
+    /// Scale of each state variable, or coordinate, when distances are measured; 1 leaves it.
     pub scale: Vec<f64>,
     /// The nodes.
     pub nodes: Vec<Node>,
@@ -57,7 +60,7 @@ pub struct Node {
     pub levels: (LevelId, LevelId),
     /// Mode, or memory, it belongs to.
     pub mode: ModeId,
-    /// Where it is among the means of its levels.
+    /// Where it is among the means of its levels, in [`Automaton::coordinates`].
     pub place: Place,
     /// What to do.
     pub action: ActionId,
@@ -212,6 +215,7 @@ impl Automaton {
                 })
                 .collect(),
             planned_value: None,
+            coordinates: None,
             scale: vec![1.0; model.state_dim()],
             nodes: Vec::new(),
             filter: mdp.filter(),
@@ -220,7 +224,17 @@ impl Automaton {
 
     /// The node of a belief; `None` only without nodes.
     pub fn matched(&self, belief: &Belief) -> Option<NodeId> {
-        self.closest(self.candidates(belief.level, belief.mode), &belief.mean)
+        let candidates = self.candidates(belief.level, belief.mode);
+        match &self.coordinates {
+            None => self.closest(candidates, &belief.mean),
+            Some(coordinates) => self.closest(candidates, &coordinates.of(&belief.mean)),
+        }
+    }
+
+    /// Names of what places are stated in: the coordinates, or else the state variables.
+    pub fn place_names(&self) -> &[String] {
+        let coordinates = self.coordinates.as_ref();
+        coordinates.map_or(&self.states, |coordinates| &coordinates.names)
     }
 
     /// Nodes among which a belief of this level and mode finds its own. A level or mode without nodes borrows those of the

@@ -268,20 +268,16 @@ impl Automaton {
     }
 }
 
-/// Whether a place and a box share more than a border.
+/// Whether a place and a box share more than a border, or anything at all where one of them is nothing but border: a point or a
+/// flat box.
 fn overlaps(place: &Place, low: &[f64], high: &[f64]) -> bool {
-    match place {
-        Place::Point(point) => (0..point.len()).all(|i| low[i] <= point[i] && point[i] <= high[i]),
-        Place::Segment { lower, upper, .. } => {
-            let point_like = lower == upper;
-            (0..lower.len()).all(|i| {
-                if point_like {
-                    low[i] <= lower[i] && lower[i] <= high[i]
-                } else {
-                    lower[i] < high[i] && low[i] < upper[i]
-                        || (low[i] == high[i] && lower[i] <= low[i] && low[i] <= upper[i])
-                }
-            })
+    let (lower, upper) = (place.lower(), place.upper());
+    let flat = (0..lower.len()).any(|i| lower[i] == upper[i] || low[i] == high[i]);
+    (0..lower.len()).all(|i| {
+        if flat {
+            lower[i] <= high[i] && low[i] <= upper[i]
+        } else {
+            lower[i] < high[i] && low[i] < upper[i]
         }
-    }
+    })
 }

@@ -2,7 +2,7 @@
 
 use crate::belief::{Belief, Filter};
 use crate::model::ActionId;
-use crate::policy::{Automaton, Matching, NodeId, Place, Policy};
+use crate::policy::{Automaton, Coordinates, MOST_COORDINATES, Matching, NodeId, Place, Policy};
 
 /// Nodes compared at a time, side by side in memory so that one instruction serves several.
 const LANES: usize = 8;
@@ -12,6 +12,7 @@ const LANES: usize = 8;
 pub struct Controller {
     filter: Filter,
     matching: Matching,
+    coordinates: Option<Coordinates>,
     levels: usize,
     /// By mode and level: the blocks of candidates from the first up to, not including, the last.
     ranges: Vec<(usize, usize)>,
@@ -33,6 +34,7 @@ impl Controller {
         let levels = automaton.levels.len();
         let mut controller = Self {
             matching: automaton.matching,
+            coordinates: automaton.coordinates.clone(),
             levels,
             ranges: Vec::new(),
             rows: Vec::new(),
@@ -109,37 +111,44 @@ impl Controller {
         if from == to {
             return (0, 0);
         }
-        let best = match self.matching {
-            Matching::Nearest => {
-                self.closest::<1>(from, to, &belief.mean, |[point], at| point - at)
-            }
-            Matching::Segments => {
-                self.closest::<2>(from, to, &belief.mean, |[lower, upper], at| {
-                    // `f64::max` would also look after NaN, of which there is none.
-                    let (below, above) = (lower - at, at - upper);
-                    let outside = if below > above { below } else { above };
-                    if outside > 0.0 { outside } else { 0.0 }
-                })
+        let best = match &self.coordinates {
+            None => self.match_place(from, to, &belief.mean),
+            Some(coordinates) => {
+                let mut place = [0.0; MOST_COORDINATES];
+                coordinates.write(&belief.mean, &mut place);
+                self.match_place(from, to, &place[..coordinates.count()])
             }
         };
         self.nodes[best]
     }
 
-    /// The first of the candidates in blocks `from..to` that are closest to a mean. `apart` gives the distance along one variable
+    fn match_place(&self, from: usize, to: usize, place: &[f64]) -> usize {
+        match self.matching {
+            Matching::Nearest => self.closest::<1>(from, to, place, |[point], at| point - at),
+            Matching::Segments => self.closest::<2>(from, to, place, |[lower, upper], at| {
+                // `f64::max` would also look after NaN, of which there is none.
+                let (below, above) = (lower - at, at - upper);
+                let outside = if below > above { below } else { above };
+                if outside > 0.0 { outside } else { 0.0 }
+            }),
+        }
+    }
+
+    /// The first of the candidates in blocks `from..to` that are closest to a place. `apart` gives the distance along one variable
     /// from that variable's `ROWS` rows.
     fn closest<const ROWS: usize>(
         &self,
         from: usize,
         to: usize,
-        mean: &[f64],
+        place: &[f64],
         apart: impl Fn([f64; ROWS], f64) -> f64,
     ) -> usize {
-        let height = ROWS * mean.len();
+        let height = ROWS * place.len();
         let blocks = self.rows[from * height..to * height].chunks_exact(height);
         let mut closest = (f64::INFINITY, from * LANES);
         for (block, rows) in blocks.enumerate() {
             let mut distance = [0.0; LANES];
-            for ((rows, m), inverse) in rows.chunks_exact(ROWS).zip(mean).zip(&self.inverse) {
+            for ((rows, m), inverse) in rows.chunks_exact(ROWS).zip(place).zip(&self.inverse) {
                 let at = m * inverse;
                 for (lane, distance) in distance.iter_mut().enumerate() {
                     let apart = apart(std::array::from_fn(|row| rows[row][lane]), at);

@@ -3,10 +3,12 @@
 mod automaton;
 mod builder;
 mod controller;
+mod coordinates;
 mod store;
 
 pub use automaton::{Automaton, Matching, Node, NodeId, Observed, Place};
 pub use controller::Controller;
+pub use coordinates::{Coordinates, MOST_COORDINATES};
 pub use store::write_whole;
 
 use crate::belief::Belief;

@@ -114,6 +114,42 @@ impl Automaton {
         })
     }
 
+    /// Whether it can act in the world of a model, be it made for another one: the same actions and state variables in the same order, and
+    /// as many readings.
+    ///
+    /// # Errors
+    /// [`Error::Policy`] with the first difference.
+    pub fn check_world(&self, world: &Model, origin: &str) -> Result<()> {
+        let fail = |what: &str, own: &[String], others: Vec<&str>| Error::Policy {
+            origin: origin.to_owned(),
+            reason: format!(
+                "this policy has the {what} {}, and the world of {} has {}; choose a world with the same",
+                own.join(", "),
+                world.name,
+                others.join(", ")
+            ),
+        };
+        let actions: Vec<&str> = world.actions.iter().map(|a| a.name.as_str()).collect();
+        if self.actions != actions {
+            return Err(fail("actions", &self.actions, actions));
+        }
+        let states: Vec<&str> = world.state.iter().map(|v| v.name.as_str()).collect();
+        if self.states != states {
+            return Err(fail("state variables", &self.states, states));
+        }
+        if self.filter.readings() != world.observation_dim() {
+            return Err(Error::Policy {
+                origin: origin.to_owned(),
+                reason: format!(
+                    "the world of {} gives {} readings, which this policy's filter does not fit; choose a world with the same sensor",
+                    world.name,
+                    world.observation_dim()
+                ),
+            });
+        }
+        Ok(())
+    }
+
     fn check(&self) -> std::result::Result<(), String> {
         let fault = self.filter_fault().map(str::to_owned).or_else(|| {
             let nodes = self.nodes.iter().enumerate();
@@ -132,7 +168,12 @@ impl Automaton {
         if self.filter.states() != n || !self.filter.fits(sizes.0, sizes.1, sizes.2) {
             return Some("the filter does not fit the states, levels and actions");
         }
-        if self.scale.len() != n || !self.scale.iter().all(|s| *s > 0.0 && s.is_finite()) {
+        let coordinates = self.coordinates.as_ref();
+        if coordinates.is_some_and(|coordinates| !coordinates.fits(n)) {
+            return Some("the coordinates are not named vectors of the state");
+        }
+        let places = self.place_names().len();
+        if self.scale.len() != places || !self.scale.iter().all(|s| *s > 0.0 && s.is_finite()) {
             return Some("the scale is not one positive number for each state variable");
         }
         let square = |level: &Vec<f64>| level.len() == n * n && level.iter().all(|p| p.is_finite());
@@ -143,7 +184,7 @@ impl Automaton {
     }
 
     fn node_fault(&self, node: &Node) -> Option<String> {
-        let n = self.states.len();
+        let n = self.place_names().len();
         let fits =
             |values: &[f64]| values.len() == n && values.iter().all(|value| value.is_finite());
         let place_fits = match &node.place {

@@ -11,6 +11,7 @@ mod belief_map;
 mod curve;
 mod finding;
 mod layout;
+mod learning;
 mod page;
 mod palette;
 mod plot;
@@ -27,6 +28,7 @@ pub use curve::{Series, curves_svg};
 pub use finding::{
     Algorithm, Figure, Finding, Frame, Hypothesis, Recording, Report, Table, Verdict,
 };
+pub use learning::{returns_svg, values_svg};
 pub use page::{page_html, page_markdown, tables_csv};
 pub use record::{Take, episodes, record};
 

@@ -1,11 +1,13 @@
 //! Solvers: from a model, or from experience, to a policy. [`solve`] runs any of them by name.
 
+pub mod arkaq;
 pub mod cma;
 pub mod compile;
 pub mod grid;
 pub mod hazard;
 pub mod kafaq;
 pub mod kbvi;
+mod learn;
 pub mod lqg;
 pub mod lqr;
 pub mod mdp;
@@ -17,6 +19,7 @@ mod run;
 mod solution;
 mod solver;
 pub mod walled;
+pub mod yardstick;
 
 pub use run::{SolveSettings, solve};
 pub use solution::{Form, Solution, Solved};

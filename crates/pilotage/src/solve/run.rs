@@ -1,17 +1,19 @@
 //! One way to run any solver.
 
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 
 use super::kbvi::branches::{self, Branches};
 use super::kbvi::{closed, formulas::Formulas, generate, quadratic};
 use super::mls::MostLikelyState;
 use super::qmdp::Qmdp;
-use super::{Form, Solution, Solved, SolverKind, compile, lqg, mdp};
+use super::{Form, Solution, Solved, SolverKind, compile, kafaq, lqg, mdp};
 use crate::belief::BeliefMdp;
 use crate::error::Result;
 use crate::model::Model;
 use crate::observe::Observer;
 use crate::policy::{Automaton, Controller, Policy};
+use crate::world::{ProblemWorld, World};
 
 /// Settings of all solvers; each takes what concerns it.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +40,10 @@ pub struct SolveSettings {
     pub effort: f64,
     /// What deviations cost `lqg`.
     pub weights: lqg::Weights,
+    /// What concerns `kafaq` alone; its seed is `seed`.
+    pub kafaq: kafaq::Settings,
+    /// File in which a learner keeps its state, to go on from there if it is stopped.
+    pub checkpoint: Option<PathBuf>,
 }
 
 impl Default for SolveSettings {
@@ -55,6 +61,8 @@ impl Default for SolveSettings {
             formulas: generate.search.formulas,
             effort: 1.0,
             weights: lqg::Weights::default(),
+            kafaq: kafaq::Settings::default(),
+            checkpoint: None,
         }
     }
 }
@@ -92,7 +100,7 @@ pub fn solve(
     settings: &SolveSettings,
     observer: &dyn Observer,
 ) -> Result<Solution> {
-    kind.accepts(model)?;
+    kind.accepts_with(model, &settings.kafaq)?;
     let mdp = BeliefMdp::new(model);
     if kind == SolverKind::Lqg && lqg::use_of(model) == Ok(lqg::Use::Control) {
         return control(&mdp);
@@ -117,6 +125,7 @@ pub fn solve(
             let converged = policy.converged();
             planned(kind, &mdp, policy, converged, settings)
         }
+        SolverKind::Kafaq => learned(&mdp, settings, observer),
         SolverKind::Mls => {
             let policy = MostLikelyState::solve(&mdp, &settings.states(), observer)?;
             let converged = policy.converged();
@@ -163,7 +172,38 @@ fn kbvi(mdp: &BeliefMdp, settings: &SolveSettings, observer: &dyn Observer) -> R
         policy_convergence_horizon: generated.convergence_horizon,
         levels: mdp.levels().len(),
         samples: None,
+        learning: None,
         converged: generated.convergence_horizon.is_some(),
+    })
+}
+
+/// Learned in the model's own world. The regions learned are the automaton, in whatever form it is asked for.
+fn learned(mdp: &BeliefMdp, settings: &SolveSettings, observer: &dyn Observer) -> Result<Solution> {
+    let model = mdp.model();
+    let own = kafaq::Settings {
+        seed: settings.seed,
+        ..settings.kafaq.clone()
+    };
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+    let checkpoint = settings.checkpoint.as_deref();
+    let learned = kafaq::learn(model, &worlds, &own, checkpoint, observer)?;
+    let mut automaton = learned.automaton;
+    let compiler = settings.compiler();
+    compile::annotate(&mut automaton, mdp, compiler.episodes, compiler.seed);
+    Ok(Solution {
+        policy: match settings.form {
+            Form::Nearest | Form::Segments => Solved::Automaton(automaton),
+            Form::Grid => Solved::Rule {
+                filter: automaton.filter.clone(),
+                policy: Box::new(Controller::new(&automaton)),
+            },
+        },
+        planned_value: None,
+        policy_convergence_horizon: None,
+        levels: mdp.levels().len(),
+        samples: Some(learned.samples),
+        learning: Some(learned.learning),
+        converged: learned.converged,
     })
 }
 
@@ -176,6 +216,7 @@ fn control(mdp: &BeliefMdp) -> Result<Solution> {
         policy_convergence_horizon: None,
         levels: mdp.levels().len(),
         samples: None,
+        learning: None,
         converged: true,
     })
 }
@@ -218,6 +259,7 @@ fn searched(mdp: &BeliefMdp, automaton: Automaton) -> Solution {
         policy_convergence_horizon: None,
         levels: mdp.levels().len(),
         samples: None,
+        learning: None,
         converged: true,
     }
 }
@@ -244,6 +286,7 @@ fn planned(
         policy_convergence_horizon: None,
         levels: mdp.levels().len(),
         samples: None,
+        learning: None,
         converged,
     })
 }

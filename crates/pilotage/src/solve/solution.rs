@@ -1,6 +1,6 @@
 //! What a solver hands over, in the form asked for.
 
-use super::lqg;
+use super::{kafaq, lqg};
 use crate::belief::Filter;
 use crate::error::{Error, Result};
 use crate::model::{Model, suggest};
@@ -8,7 +8,7 @@ use crate::observe::Observer;
 use crate::policy::{Automaton, Controller, Matching, Policy};
 use crate::simulate::{Evaluation, Options, evaluate};
 
-/// Form of the policy a solver hands over.
+/// Form of the policy a planner hands over. Learners hand over the form they learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Form {
     /// An automaton matched by nearest neighbour (5.4.2).
@@ -67,6 +67,8 @@ pub struct Solution {
     pub levels: usize,
     /// Steps of experience used; `None` for planners.
     pub samples: Option<u64>,
+    /// How learning went; `None` for planners.
+    pub learning: Option<kafaq::Learning>,
     /// Whether the solver's own test of convergence was passed.
     pub converged: bool,
 }

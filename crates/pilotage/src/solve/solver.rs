@@ -1,7 +1,7 @@
 //! The solvers by name: which there are, and what each accepts.
 
 use super::kbvi::quadratic;
-use super::{lqg, mdp};
+use super::{kafaq, lqg, mdp};
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
 use crate::model::{Interval, Model, When, suggest};
@@ -20,16 +20,19 @@ pub enum SolverKind {
     Qmdp,
     /// Most likely state (Nourbakhsh, Powers and Birchfield, 1995).
     Mls,
+    /// KAFAQ-learning (thesis chapter 4).
+    Kafaq,
 }
 
 impl SolverKind {
     /// All solvers.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::KbviClosed,
         Self::Kbvi,
         Self::Lqg,
         Self::Qmdp,
         Self::Mls,
+        Self::Kafaq,
     ];
 
     /// Its name, as on the command line.
@@ -40,6 +43,7 @@ impl SolverKind {
             Self::Lqg => "lqg",
             Self::Qmdp => "qmdp",
             Self::Mls => "mls",
+            Self::Kafaq => "kafaq",
         }
     }
 
@@ -51,6 +55,7 @@ impl SolverKind {
             Self::Lqg => "linear feedback on the mean, for quadratic cost or the nearest action",
             Self::Qmdp => "acts as if all uncertainty were gone after this step",
             Self::Mls => "acts as if the most likely state were certain",
+            Self::Kafaq => "learns regions of belief by trial, told neither map nor rewards",
         }
     }
 
@@ -67,11 +72,21 @@ impl SolverKind {
         })
     }
 
-    /// Whether it is made for such a model.
+    /// Whether it learns from experience, rather than plan from the model.
+    pub fn learns(self) -> bool {
+        self == Self::Kafaq
+    }
+
+    /// Whether it is made for such a model, with its default settings.
     ///
     /// # Errors
     /// [`Error::Unsupported`] with the reason, and what would do.
     pub fn accepts(self, model: &Model) -> Result<()> {
+        self.accepts_with(model, &kafaq::Settings::default())
+    }
+
+    /// As [`SolverKind::accepts`], for a learner with these settings.
+    pub(super) fn accepts_with(self, model: &Model, settings: &kafaq::Settings) -> Result<()> {
         let reason = match self {
             Self::Kbvi => reward_missing(model).or_else(|| pays_afterwards(model)),
             Self::KbviClosed if quadratic::suits(model) => {
@@ -83,8 +98,10 @@ impl SolverKind {
                 .or_else(|| pays_afterwards(model))
                 .or_else(|| bound_missing(model))
                 .or_else(|| too_many_variables(model)),
+            Self::Kafaq => reward_missing(model),
         };
         match reason {
+            None if self == Self::Kafaq => kafaq::accepts(model, settings),
             None => Ok(()),
             Some(reason) => Err(Error::Unsupported {
                 solver: self.name(),
@@ -95,7 +112,7 @@ impl SolverKind {
     }
 }
 
-/// Planners that maximise reward need some, discounted.
+/// Those that maximise reward need some, discounted.
 fn reward_missing(model: &Model) -> Option<String> {
     if model.rewards.is_empty() && model.events.is_empty() && model.episode.failure_reward == 0.0 {
         return Some("nothing in it pays a reward; add a [[reward]]".to_owned());

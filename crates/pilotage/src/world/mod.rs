@@ -3,10 +3,12 @@
 mod cart_pole;
 mod noise;
 mod problem;
+mod robot;
 
 pub use cart_pole::Plant;
 pub use noise::Noise;
 pub use problem::ProblemWorld;
+pub use robot::RobotArena;
 
 use crate::model::{ActionId, ModeId, Then};
 use crate::random::{Rng, Role, stream};

@@ -2,6 +2,7 @@
 
 use super::cart_pole::Plant;
 use super::noise::Noise;
+use super::robot::RobotArena;
 use super::{Draws, Step, World};
 use crate::model::{
     ActionId, Barriers, ModeId, Model, StartHypothesis, StartShape, Then, Walls, When, WorldKind,
@@ -36,6 +37,11 @@ enum Dynamics {
         forces: Vec<f64>,
         force_sd: f64,
     },
+    /// A robot, with the displacement that each action names.
+    Robot {
+        arena: RobotArena,
+        displacements: Vec<Vec<f64>>,
+    },
 }
 
 impl ProblemWorld {
@@ -68,6 +74,13 @@ impl ProblemWorld {
                     .collect(),
                 force_sd: parameters.force_noise.sqrt(),
             },
+            WorldKind::Robot(robot) => Dynamics::Robot {
+                arena: RobotArena::new(robot, model),
+                displacements: actions
+                    .clone()
+                    .map(|action| model.displacement(action).as_slice().to_vec())
+                    .collect(),
+            },
         };
         let starts = model.world.start.as_ref().unwrap_or(&model.start);
         Self {
@@ -94,7 +107,7 @@ impl ProblemWorld {
     }
 
     fn move_on(&mut self, mode: ModeId, action: ActionId, draws: &mut Draws) {
-        match &self.dynamics {
+        match &mut self.dynamics {
             Dynamics::Linear {
                 a,
                 displacements,
@@ -119,14 +132,33 @@ impl ProblemWorld {
                 self.scratch.copy_from_slice(&self.state);
                 plant.advance(
                     &mut self.scratch,
-                    forces[action] + force_sd * normal(&mut draws.world),
+                    forces[action] + *force_sd * normal(&mut draws.world),
                 );
             }
+            Dynamics::Robot {
+                arena,
+                displacements,
+            } => arena.carry_out(&displacements[action], &mut self.scratch, &mut draws.world),
         }
         if let Some(walls) = &self.walls {
             walls.stop(&self.state, &mut self.scratch);
         }
         std::mem::swap(&mut self.state, &mut self.scratch);
+    }
+
+    /// Writes what is sensed in the current state after an action.
+    fn sense(&self, action: ActionId, draws: &mut Draws, observation: &mut [f64]) {
+        if let Dynamics::Robot { arena, .. } = &self.dynamics {
+            arena.sense(observation, &mut draws.sensor);
+            return;
+        }
+        let h = &self.model.sensor.h;
+        for (i, reading) in observation.iter_mut().enumerate() {
+            *reading = (0..self.state.len())
+                .map(|j| h[(i, j)] * self.state[j])
+                .sum();
+        }
+        self.sensor_noise[action].add_to(observation, &mut draws.sensor);
     }
 
     /// What is paid in the current state for the action taken in the mode.
@@ -194,6 +226,9 @@ impl World for ProblemWorld {
         if let Some(walls) = &self.walls {
             walls.stop(start.mean.as_slice(), &mut self.state);
         }
+        if let Dynamics::Robot { arena, .. } = &mut self.dynamics {
+            arena.put(&mut self.state);
+        }
     }
 
     fn step(&mut self, action: ActionId, draws: &mut Draws, observation: &mut [f64]) -> Step {
@@ -227,13 +262,7 @@ impl World for ProblemWorld {
                 return self.close(reward, then, draws);
             }
         }
-        let h = &self.model.sensor.h;
-        for (i, reading) in observation.iter_mut().enumerate() {
-            *reading = (0..self.state.len())
-                .map(|j| h[(i, j)] * self.state[j])
-                .sum();
-        }
-        self.sensor_noise[action].add_to(observation, &mut draws.sensor);
+        self.sense(action, draws, observation);
         Step {
             reward,
             then: Then::Continue,

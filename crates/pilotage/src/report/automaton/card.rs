@@ -134,20 +134,21 @@ fn rows(automaton: &Automaton, node: &Node) -> Vec<String> {
     if automaton.modes.len() > 1 {
         rows.push(named(&automaton.modes, node.mode, "mode"));
     }
-    let deviations = deviations(automaton, node);
+    let names = automaton.place_names();
+    let deviations = match automaton.coordinates {
+        None => deviations(automaton, node),
+        Some(_) => Vec::new(),
+    };
     let alike = deviations.windows(2).all(|pair| pair[0] == pair[1]);
-    for (variable, name) in automaton.states.iter().enumerate().take(MOST_VARIABLES) {
+    for (variable, name) in names.iter().enumerate().take(MOST_VARIABLES) {
         let place = place(name, &node.place, variable);
         match deviations.get(variable) {
             Some(deviation) if !alike => rows.push(format!("{place}, σ {deviation}")),
             _ => rows.push(place),
         }
     }
-    if automaton.states.len() > MOST_VARIABLES {
-        rows.push(format!(
-            "and {} more",
-            automaton.states.len() - MOST_VARIABLES
-        ));
+    if names.len() > MOST_VARIABLES {
+        rows.push(format!("and {} more", names.len() - MOST_VARIABLES));
     }
     if let (true, Some(deviation)) = (alike, deviations.first()) {
         rows.push(format!("σ = {deviation}"));

@@ -107,7 +107,7 @@ pub fn automaton_svg(automaton: &Automaton) -> Result<String> {
 fn check(automaton: &Automaton) -> Result<()> {
     let numbers = automaton.nodes.iter().map(|node| {
         let counts = node.predecessors.iter().all(|(_, count)| count.is_finite());
-        is_sound(&node.place, automaton.states.len()) && counts && node.visits.is_finite()
+        is_sound(&node.place, automaton.place_names().len()) && counts && node.visits.is_finite()
     });
     let levels = automaton.levels.iter().flatten().all(|x| x.is_finite());
     let reason = match numbers.enumerate().find(|(_, sound)| !sound) {

@@ -17,19 +17,19 @@ const HEADING: f64 = 40.0;
 const SAMPLES: usize = 240;
 
 pub fn draw(map: &Map<'_>) -> String {
-    let modes = map.mdp.model().modes.len();
-    let columns = modes.min(2);
+    let modes = map.modes();
+    let columns = modes.len().min(2);
     let plot_width = if columns == 1 { 560.0 } else { 330.0 };
     let panel_width = plot_width + 2.0 * SIDE;
     let width = columns as f64 * panel_width + (columns - 1) as f64 * GAP;
     let levels = shown_levels(map);
     let mut sheet = map.sheet(&what(map, &levels), width);
-    let row = (360.0 / levels.len() as f64).clamp(1.0, 44.0);
-    let plot_height = row * levels.len() as f64;
-    for first in (0..modes).step_by(columns) {
+    let level_height = (360.0 / levels.len() as f64).clamp(1.0, 44.0);
+    let plot_height = level_height * levels.len() as f64;
+    for row in modes.chunks(columns) {
         let top = sheet.y() + HEADING;
-        let panels = (first..modes.min(first + columns)).flat_map(|mode| {
-            let left = MARGIN + (mode - first) as f64 * (panel_width + GAP) + SIDE;
+        let panels = row.iter().enumerate().flat_map(|(column, &mode)| {
+            let left = MARGIN + column as f64 * (panel_width + GAP) + SIDE;
             let panel = Panel {
                 map,
                 mode,
@@ -43,7 +43,7 @@ pub fn draw(map: &Map<'_>) -> String {
         sheet.draw(elements, HEADING + plot_height + axes::BELOW);
     }
     let mut marks = vec![(Sign::Diamond, "start".to_owned())];
-    if (0..modes).any(|mode| !map.goals(mode).is_empty()) {
+    if modes.iter().any(|&mode| !map.goals(mode).is_empty()) {
         marks.push((Sign::Bar(Paint::Ink), "where a reward is paid".to_owned()));
     }
     sheet.legend(&map.legend(marks));
@@ -347,6 +347,6 @@ impl Panel<'_> {
         let start = self.map.mdp.start();
         let row = self.levels.iter().position(|&level| level == start.level)?;
         let place = (self.x.clamped(start.mean[0]), self.y.at(row as f64 + 0.5));
-        (start.mode == self.mode).then(|| diamond(place))
+        (self.map.start_mode() == self.mode).then(|| diamond(place))
     }
 }

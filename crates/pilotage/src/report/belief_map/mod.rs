@@ -24,13 +24,17 @@ const BEYOND: f64 = 0.12;
 /// With one state variable: its mean across, uncertainty levels up, the most certain at the bottom. With two: a plane for up
 /// to four levels. With more: the plane of the two most uncertain variables at the steady level, the others at the start mean.
 ///
+/// An automaton that remembers more than the modes of the model, as one that was learned may, is drawn by what it remembers.
+///
 /// # Errors
-/// [`Error::Policy`] if the automaton is not one of this problem's state variables, levels and modes.
+/// [`Error::Policy`] if the automaton is not one of this problem's state variables and levels.
 pub fn belief_map_svg(
     mdp: &BeliefMdp,
     policy: &dyn Policy,
     automaton: Option<&Automaton>,
 ) -> Result<String> {
+    // Places in coordinates of their own have no frames among the state variables.
+    let automaton = automaton.filter(|automaton| automaton.coordinates.is_none());
     if let Some(automaton) = automaton {
         check(mdp, automaton)?;
     }
@@ -51,7 +55,7 @@ fn check(mdp: &BeliefMdp, automaton: &Automaton) -> Result<()> {
     let fits = automaton.nodes.iter().all(|node| {
         is_sound(&node.place, n)
             && node.levels.1 < mdp.levels().len()
-            && node.mode < model.modes.len()
+            && node.mode < automaton.modes.len()
             && node.action < model.actions.len()
     });
     if fits && automaton.scale.len() == n {
@@ -181,7 +185,29 @@ impl Map<'_> {
         each.collect::<Vec<_>>().join(", ")
     }
 
-    /// Where something good is paid in a mode, but for what is paid everywhere.
+    /// What the policy tells apart: the automaton's modes or memories that have nodes, or else the model's modes.
+    fn modes(&self) -> Vec<ModeId> {
+        match self.automaton {
+            None => (0..self.mdp.model().modes.len()).collect(),
+            Some(automaton) => (0..automaton.modes.len())
+                .filter(|&mode| self.nodes(mode).next().is_some())
+                .collect(),
+        }
+    }
+
+    /// Whether they are not the model's modes but memories of its own.
+    fn remembers(&self) -> bool {
+        let own = |automaton: &Automaton| automaton.modes != self.mdp.model().modes;
+        self.automaton.is_some_and(own)
+    }
+
+    /// The mode or memory at the start.
+    fn start_mode(&self) -> ModeId {
+        let start = |automaton: &Automaton| automaton.filter.initial().mode;
+        self.automaton.map_or(self.mdp.start().mode, start)
+    }
+
+    /// Where something good is paid in a mode, but for what is paid everywhere. What is remembered is no mode, and shows all.
     fn goals(&self, mode: ModeId) -> Vec<&Region> {
         let model = self.mdp.model();
         let rewards = model
@@ -201,15 +227,19 @@ impl Map<'_> {
         rewards
             .chain(events)
             .filter(|(needed, value, region)| {
-                needed.is_none_or(|needed| needed == mode) && *value > 0.0 && bounded(region)
+                (self.remembers() || needed.is_none_or(|needed| needed == mode))
+                    && *value > 0.0
+                    && bounded(region)
             })
             .map(|(_, _, region)| region)
             .collect()
     }
 
-    /// Name of a mode for a heading; empty where there is only one.
+    /// Name of a mode or memory for a heading; empty where there is only one.
     fn mode_name(&self, mode: ModeId) -> &str {
-        let modes = &self.mdp.model().modes;
+        let modes = self
+            .automaton
+            .map_or(&self.mdp.model().modes, |automaton| &automaton.modes);
         if modes.len() > 1 { &modes[mode] } else { "" }
     }
 }

@@ -25,9 +25,10 @@ const SAMPLES: usize = 150;
 
 pub fn draw(map: &Map<'_>) -> String {
     let plane = Plane::new(map);
-    let modes = map.mdp.model().modes.len();
-    let panels: Vec<(ModeId, LevelId)> = (0..modes)
-        .flat_map(|mode| plane.levels.iter().map(move |&level| (mode, level)))
+    let modes = map.modes();
+    let panels: Vec<(ModeId, LevelId)> = modes
+        .iter()
+        .flat_map(|&mode| plane.levels.iter().map(move |&level| (mode, level)))
         .collect();
     let columns = if panels.len() == 4 {
         2
@@ -59,7 +60,7 @@ pub fn draw(map: &Map<'_>) -> String {
         sheet.draw(elements, HEADING + plot_height + axes::BELOW);
     }
     let mut marks = vec![(Sign::Diamond, "start".to_owned())];
-    if (0..modes).any(|mode| !map.goals(mode).is_empty()) {
+    if modes.iter().any(|&mode| !map.goals(mode).is_empty()) {
         marks.push((Sign::Frame(Paint::Ink), "where a reward is paid".to_owned()));
     }
     sheet.legend(&map.legend(marks));
@@ -108,7 +109,7 @@ impl<'a> Plane<'a> {
     fn size(&self) -> (f64, f64) {
         let width = |(low, high): (f64, f64)| high - low;
         let ratio = width(self.extent.0) / width(self.extent.1);
-        let modes = self.map.mdp.model().modes.len();
+        let modes = self.map.modes().len();
         let side = if self.levels.len() * modes == 1 {
             LONE_SIDE
         } else {
@@ -446,7 +447,7 @@ impl Panel<'_> {
 
     fn start(&self) -> Option<Element> {
         let start = self.plane.map.mdp.start();
-        let here = start.mode == self.mode && start.level == self.level;
+        let here = self.plane.map.start_mode() == self.mode && start.level == self.level;
         here.then(|| {
             diamond(self.point((start.mean[self.plane.across], start.mean[self.plane.up])))
         })

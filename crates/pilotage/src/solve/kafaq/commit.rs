@@ -2,15 +2,14 @@
 //! `r + discount V` of the level that the step leads to. A level inherits the regions of that level and has its own only where
 //! evidence calls for them.
 
-use super::Experience;
 use super::draft::{Draft, DraftNode};
 use super::evidence::Halves;
 use super::regions::{Region, Reviser, actions_by_cell};
 use super::steady::Steady;
-use super::table::any_action;
 use super::task::Task;
 use crate::model::Then;
 use crate::random::uniform;
+use crate::solve::learn::{Experience, any_action};
 
 /// Fewest visits of a level.
 const VISITS: usize = 1_000;
@@ -115,12 +114,12 @@ fn explore_level(
     let mut evidence = vec![Halves::new(cells, actions); draft.memory.len()];
     let mut actor = task.actor();
     for _ in 0..(task.settings.epoch_per_cell * cells * actions).max(VISITS) {
-        let (mut draws, mut exploration) = experience.next_episode(task);
+        let (mut draws, mut exploration) = experience.next_episode(task.settings.seed);
         actor.reset(&mut draws);
         let mut memory = 0;
         for passed in 0..=level {
             let action = any_action(actions, &mut exploration);
-            let cell = task.lattice.cell(&actor.belief.mean);
+            let cell = task.cell(&actor.belief.mean);
             let step = actor.step(action, &mut draws);
             experience.collect(step.reward);
             let next = draft
@@ -128,7 +127,7 @@ fn explore_level(
                 .next(memory, action, step.reward, &actor.belief.mean);
             if passed == level {
                 let future = match step.then {
-                    Then::Continue => values[next * cells + task.lattice.cell(&actor.belief.mean)],
+                    Then::Continue => values[next * cells + task.cell(&actor.belief.mean)],
                     Then::Restart | Then::End => 0.0,
                 };
                 let target = step.reward + task.discount() * future;

@@ -48,6 +48,10 @@ impl Draft {
     pub fn compile(&self, task: &Task<'_>) -> Automaton {
         let mut automaton = Automaton::new(&task.mdp, SOLVER, Matching::Segments);
         automaton.fingerprint = task.fingerprint;
+        if let Some(coordinates) = &task.coordinates {
+            automaton.scale = vec![1.0; coordinates.count()];
+            automaton.coordinates = Some(coordinates.clone());
+        }
         automaton.modes = (0..self.memory.len())
             .map(|memory| self.memory.name(memory))
             .collect();

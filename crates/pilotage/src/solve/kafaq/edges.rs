@@ -2,7 +2,8 @@
 
 use super::draft::{Draft, DraftNode, Edge};
 use super::steady::Steady;
-use super::task::{Task, Trial, discounted};
+use super::task::Task;
+use crate::solve::learn::{Trial, discounted};
 
 /// Nodes and edges of what was learned, with the trial that chose the edges.
 pub(super) fn compile(task: &Task<'_>, steady: &Steady) -> (Draft, Trial, u64) {

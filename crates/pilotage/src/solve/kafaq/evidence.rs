@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::belief::gaussian::normal_cdf;
 use crate::model::ActionId;
 
 /// Fewer targets than this say nothing about their variance.
@@ -173,30 +172,9 @@ impl Halves {
     }
 }
 
-/// The `z` that N(0, 1) exceeds with the given probability, in `(0, 0.5)`.
-pub(super) fn critical(probability: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 40.0);
-    for _ in 0..80 {
-        let middle: f64 = 0.5 * (low + high);
-        if normal_cdf(-middle) > probability {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn critical_values_are_those_of_the_tables() {
-        for (probability, z) in [(0.05, 1.6448536), (0.001, 3.0902323), (0.025, 1.9599640)] {
-            assert!((critical(probability) - z).abs() < 1e-6);
-        }
-    }
 
     #[test]
     fn a_gain_is_the_weighted_difference_of_means_with_welch_variance() {

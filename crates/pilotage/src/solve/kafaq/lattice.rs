@@ -1,5 +1,7 @@
 //! Neighbourhoods of belief means: the cells of a lattice over the world's outer bounds, and the boxes made of them.
 
+use std::sync::OnceLock;
+
 use serde::{Deserialize, Serialize};
 
 use crate::model::{Interval, Region as Place};
@@ -10,8 +12,8 @@ pub(super) struct Lattice {
     low: Vec<f64>,
     side: Vec<f64>,
     counts: Vec<usize>,
-    /// Every box of cells, with its volume.
-    boxes: Vec<(CellBox, usize)>,
+    /// Every box of cells, with its volume; made when first asked for.
+    boxes: OnceLock<Vec<(CellBox, usize)>>,
 }
 
 /// A box of cells: first and last index along every variable, both included.
@@ -38,7 +40,7 @@ impl Lattice {
             .zip(side)
             .map(|(bounds, side)| (bounds.width() / side).ceil().max(1.0) as usize)
             .collect();
-        let mut lattice = Self {
+        Self {
             low: bounds.iter().map(|bounds| bounds.low).collect(),
             side: bounds
                 .iter()
@@ -46,10 +48,8 @@ impl Lattice {
                 .map(|(bounds, &count)| bounds.width() / count as f64)
                 .collect(),
             counts,
-            boxes: Vec::new(),
-        };
-        lattice.boxes = lattice.all_boxes();
-        lattice
+            boxes: OnceLock::new(),
+        }
     }
 
     fn all_boxes(&self) -> Vec<(CellBox, usize)> {
@@ -92,7 +92,7 @@ impl Lattice {
 
     /// Every box of cells, with its volume.
     pub fn boxes(&self) -> &[(CellBox, usize)] {
-        &self.boxes
+        self.boxes.get_or_init(|| self.all_boxes())
     }
 
     /// The box of all cells.

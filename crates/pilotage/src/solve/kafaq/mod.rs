@@ -9,6 +9,8 @@
 //! collected by neighbourhood and action, and a test with a stated error rate says whether another action is better there
 //! ([`Settings::split_error`]). The printed rules are kept as [`Rules::Printed`].
 //!
+//! Neighbourhoods are the cells of a lattice along the state variables, or along the modes of a motion that mixes them (`axes`).
+//!
 //! 1. *The steady level* (`steady`): Q-learning with Boltzmann exploration; every epoch, best actions, splits, extensions and
 //!    merges (`regions`), until they no longer change.
 //! 2. *Memory* (`memory`, `edges`): where events far apart are notably rewarded, the place of the last one may matter. A memory is
@@ -19,6 +21,7 @@
 //! # References
 //! C. J. C. H. Watkins, *Learning from Delayed Rewards*, 1989 (Q-learning and Q(lambda)).
 
+mod axes;
 mod checkpoint;
 mod commit;
 mod draft;
@@ -30,7 +33,6 @@ mod printed;
 mod regions;
 mod settings;
 mod steady;
-mod table;
 mod task;
 mod tidy;
 
@@ -38,20 +40,19 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::solve::learn::Worlds;
 pub use settings::{Rules, Settings};
-pub use task::Worlds;
 
 use crate::error::Result;
 use crate::model::{ActionId, Model};
 use crate::observe::Observer;
 use crate::policy::Automaton;
-use crate::random::{Rng, Role, stream};
-use crate::world::Draws;
+use crate::solve::learn::{Experience, Trial, critical, undiscounted};
+use crate::world::{ProblemWorld, World};
 use draft::Draft;
-use evidence::critical;
 use memory::{Kind, Memory};
 use steady::Steady;
-use task::{Task, Trial, undiscounted};
+use task::Task;
 
 /// What a learning run found.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,9 +63,18 @@ pub struct Learned {
     pub converged: bool,
     /// Steps of experience, trials included.
     pub samples: u64,
-    /// What it remembers, in words.
+    /// How it came about.
+    pub learning: Learning,
+}
+
+/// How learning went.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Learning {
+    /// What the automaton remembers, in words.
     pub memory: String,
-    /// How learning went, epoch by epoch.
+    /// Number of that memory among those tried, see [`Point::memory`].
+    pub adopted: usize,
+    /// Epoch by epoch.
     pub curve: Vec<Point>,
 }
 
@@ -86,14 +96,23 @@ pub struct Point {
 pub struct RegionValue {
     /// Memory it belongs to.
     pub memory: usize,
-    /// Lower corner, length `n`.
+    /// Lower corner, in the coordinates of the automaton.
     pub lower: Vec<f64>,
-    /// Upper corner, length `n`.
+    /// Upper corner.
     pub upper: Vec<f64>,
     /// Its action.
     pub action: ActionId,
     /// `Q` of that action, averaged over the region's visits.
     pub value: f64,
+}
+
+/// Whether a model can be learned with these settings.
+///
+/// # Errors
+/// [`crate::Error::Setting`] and [`crate::Error::Unsupported`], as [`learn`].
+pub fn accepts(model: &Model, settings: &Settings) -> Result<()> {
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+    Task::new(model, settings.clone(), &worlds).map(drop)
 }
 
 /// Learns an automaton in the worlds that `worlds` makes, of which `model` tells no more than the agent knows of itself.
@@ -119,7 +138,12 @@ pub fn learn(
     }
     let mut run = match checkpoint.filter(|path| path.exists()) {
         Some(path) => Run::resume(model, worlds, settings, path)?,
-        None => Run::new(model, worlds, settings)?,
+        None => {
+            let run = Run::new(model, worlds, settings)?;
+            // A file that cannot be written is known before work is done that it should keep.
+            checkpoint.map_or(Ok(()), |path| run.save(path))?;
+            run
+        }
     };
     while !run.finished() {
         run.advance(observer);
@@ -151,42 +175,11 @@ struct State {
 /// The best automaton so far and what it was made of.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Best {
+    /// Number of its memory.
+    memory: usize,
     draft: Draft,
     steady: Steady,
     converged: bool,
-}
-
-/// What a learner has met.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-struct Experience {
-    episodes: u64,
-    samples: u64,
-    /// Smallest and largest reward, 0 included.
-    rewards: (f64, f64),
-    /// Notable rewards with the mean at which they were seen.
-    events: Vec<(f64, Vec<f64>)>,
-}
-
-impl Experience {
-    /// Random numbers of the next episode: for the world, and for exploration.
-    fn next_episode(&mut self, task: &Task<'_>) -> (Draws, Rng) {
-        let (seed, episode) = (task.settings.seed, self.episodes);
-        self.episodes += 1;
-        (
-            Draws::new(seed, episode),
-            stream(seed, episode, Role::Exploration),
-        )
-    }
-
-    /// Takes in a step.
-    fn collect(&mut self, reward: f64) {
-        self.samples += 1;
-        self.rewards = (self.rewards.0.min(reward), self.rewards.1.max(reward));
-    }
-
-    fn reward_range(&self) -> f64 {
-        (self.rewards.1 - self.rewards.0).max(1e-6)
-    }
 }
 
 impl<'a> Run<'a> {
@@ -226,8 +219,8 @@ impl<'a> Run<'a> {
             self.task.settings.epoch_limit as u64,
         );
         let regions: usize = steady.regions.iter().map(Vec::len).sum();
-        observer.note(&format!(
-            "{} steps: {:.3} a step, {regions} regions",
+        observer.status(&format!(
+            "{} steps, {:.3} a step, {regions} nodes",
             self.state.experience.samples,
             earned.reward / earned.steps as f64
         ));
@@ -262,21 +255,26 @@ impl<'a> Run<'a> {
             draft.nodes.len(),
             if adopted { "adopted" } else { "not adopted" }
         ));
-        self.state.tried += 1;
         if adopted {
             let converged = steady.converged(&self.task);
             self.state.best = Some(Best {
+                memory: self.state.tried,
                 draft,
                 steady,
                 converged,
             });
         }
+        self.state.tried += 1;
     }
 
     /// The next memory worth trying. One needs events at two places; a count of an action is only tried for actions that the agent
     /// believes do not move it, for any other shows in its belief.
     fn next_memory(&self) -> Option<Steady> {
         let (task, experience) = (&self.task, &self.state.experience);
+        // Edges are boxes of state variables.
+        if task.coordinates.is_some() {
+            return None;
+        }
         let threshold = task.settings.notable * experience.rewards.1;
         let notable = experience
             .events
@@ -353,7 +351,7 @@ impl<'a> Run<'a> {
             learning,
             experience,
             curve,
-            ..
+            tried,
         } = &self.state;
         let unfinished = || {
             let steady = learning
@@ -368,8 +366,11 @@ impl<'a> Run<'a> {
             automaton: draft.compile(&self.task),
             converged: best.as_ref().is_some_and(|best| best.converged),
             samples: experience.samples,
-            memory: draft.memory.describe(&self.action_names()),
-            curve: curve.clone(),
+            learning: Learning {
+                memory: draft.memory.describe(&self.action_names()),
+                adopted: best.as_ref().map_or(*tried, |best| best.memory),
+                curve: curve.clone(),
+            },
         }
     }
 }

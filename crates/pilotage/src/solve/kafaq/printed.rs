@@ -8,12 +8,12 @@
 //! number of regions has not changed for [`CALM`] steps, or at [`Settings::printed_limit`].
 
 use super::settings::Settings;
-use super::table::boltzmann;
 use super::task::{SOLVER, Task};
-use super::{Experience, Learned, Point, RegionValue};
+use super::{Learned, Learning, Point, RegionValue};
 use crate::model::{ActionId, Then};
 use crate::observe::Observer;
 use crate::policy::{Automaton, Matching, Node, Place};
+use crate::solve::learn::{Experience, boltzmann};
 
 /// Steps without a new region that count as convergence.
 const CALM: u64 = 1_000;
@@ -80,7 +80,7 @@ pub(super) fn learn(task: &Task<'_>, observer: &dyn Observer) -> Learned {
         calm >= CALM || experience.samples >= step_limit as u64 || regions.len() >= region_limit
     };
     while !over(&experience, calm, &regions) {
-        let (mut draws, mut exploration) = experience.next_episode(task);
+        let (mut draws, mut exploration) = experience.next_episode(task.settings.seed);
         actor.reset(&mut draws);
         let mut previous: Option<(usize, ActionId, f64)> = None;
         for _ in 0..task.mdp.model().episode.length {
@@ -132,8 +132,11 @@ pub(super) fn learn(task: &Task<'_>, observer: &dyn Observer) -> Learned {
         automaton: compile(task, &regions),
         converged: calm >= CALM,
         samples: experience.samples,
-        memory: "no memory".to_owned(),
-        curve,
+        learning: Learning {
+            memory: "no memory".to_owned(),
+            adopted: 0,
+            curve,
+        },
     }
 }
 

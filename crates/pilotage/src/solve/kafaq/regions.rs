@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Evidence, Gain, Halves, critical};
+use super::evidence::{Evidence, Gain, Halves};
 use super::lattice::{CellBox, Lattice};
 use super::settings::Settings;
 use crate::model::ActionId;
+use crate::solve::learn::critical;
 
 /// Rounds of revision at most; each only changes what evidence calls for.
 const ROUNDS: usize = 20;

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::model::suggest;
+use crate::solve::learn::{Rates, ensure};
 
 /// How regions change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -25,6 +27,10 @@ pub struct Settings {
     pub rules: Rules,
     /// Side of a neighbourhood of the lattice that collects evidence, in `sqrt(P)` of the steady level; more than 0, at most 10.
     pub cell: f64,
+    /// A neighbourhood also need not be finer than this share of what an action moves; at least 0.
+    pub cell_stride: f64,
+    /// Most neighbourhoods along an axis; at least 1.
+    pub cells_along: usize,
     /// Most neighbourhoods; at least 1.
     pub cell_limit: usize,
     /// Watkins' lambda, in `[0, 1]`; 0 is one-step Q-learning.
@@ -86,6 +92,8 @@ impl Default for Settings {
             seed: 1,
             rules: Rules::Tested,
             cell: 0.85,
+            cell_stride: 0.35,
+            cells_along: 64,
             cell_limit: 4_000,
             lambda: 0.0,
             rate_power: 0.7,
@@ -117,10 +125,45 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Sets one of them by name to a value written as in JSON; words need no quotes. Ranges are left to [`Settings::validate`].
+    ///
+    /// # Errors
+    /// [`Error::Unknown`] for a name that is none, [`Error::Setting`] for a value of another kind than the setting's.
+    pub fn set(&mut self, name: &str, value: &str) -> Result<()> {
+        let wrong = |value: String| Error::Setting {
+            setting: "a setting of kafaq",
+            value,
+            range: "a value of the kind that it has by default",
+        };
+        let mut all = serde_json::to_value(&*self).map_err(|error| wrong(error.to_string()))?;
+        let Some(slot) = all.get_mut(name) else {
+            let known = all.as_object().into_iter().flat_map(|all| all.keys());
+            return Err(Error::Unknown {
+                what: "setting of kafaq",
+                name: name.to_owned(),
+                hint: suggest(name, known.map(String::as_str)),
+            });
+        };
+        let default = slot.to_string();
+        *slot = serde_json::from_str(value).unwrap_or_else(|_| value.into());
+        *self = serde_json::from_value(all)
+            .map_err(|_| wrong(format!("{name}={value} (it is {default})")))?;
+        Ok(())
+    }
+
+    /// How fast values are learned.
+    pub(super) fn rates(&self) -> Rates {
+        Rates {
+            lambda: self.lambda,
+            power: self.rate_power,
+            floor: self.rate_floor,
+        }
+    }
+
     /// Checks every setting against its range.
     ///
     /// # Errors
-    /// [`Error::Setting`] for the first that is out of range.
+    /// [`crate::Error::Setting`] for the first that is out of range.
     pub fn validate(&self) -> Result<()> {
         let open = |x: f64, low: f64, high: f64| low < x && x < high;
         let error_rate = "more than 0 and less than 0.5, such as 0.001";
@@ -130,6 +173,12 @@ impl Settings {
                 self.cell,
                 self.cell > 0.0 && self.cell <= 10.0,
                 "more than 0, at most 10",
+            ),
+            (
+                "cell_stride",
+                self.cell_stride,
+                self.cell_stride >= 0.0 && self.cell_stride.is_finite(),
+                "at least 0",
             ),
             (
                 "lambda",
@@ -247,6 +296,7 @@ impl Settings {
         }
         let counts = [
             ("cell_limit", self.cell_limit, 1),
+            ("cells_along", self.cells_along, 1),
             ("epoch", self.epoch, 1),
             ("epoch_per_cell", self.epoch_per_cell, 1),
             ("epoch_limit", self.epoch_limit, 1),
@@ -270,20 +320,4 @@ impl Settings {
         }
         Ok(())
     }
-}
-
-fn ensure(
-    setting: &'static str,
-    value: impl ToString,
-    fits: bool,
-    range: &'static str,
-) -> Result<()> {
-    if fits {
-        return Ok(());
-    }
-    Err(Error::Setting {
-        setting,
-        value: value.to_string(),
-        range,
-    })
 }

@@ -2,14 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Experience;
 use super::evidence::Halves;
 use super::memory::{Kind, Memory};
 use super::regions::{Region, Reviser};
-use super::table::{Table, Transition, boltzmann};
-use super::task::{Actor, Task};
+use super::task::Task;
 use crate::model::Then;
 use crate::random::uniform;
+use crate::solve::learn::{Actor, Experience, Table, Transition, boltzmann};
 
 /// Events that are written down to find their places.
 const EVENTS: usize = 20_000;
@@ -173,12 +172,12 @@ impl Steady {
         experience: &mut Experience,
         earned: &mut Earned,
     ) {
-        let (mut draws, mut exploration) = experience.next_episode(task);
+        let (mut draws, mut exploration) = experience.next_episode(task.settings.seed);
         actor.reset(&mut draws);
         self.table.forget_traces();
         let mut memory = 0;
         for _ in 0..task.mdp.model().episode.length {
-            let cell = task.lattice.cell(&actor.belief.mean);
+            let cell = task.cell(&actor.belief.mean);
             let row = self.row(task, memory, cell);
             let temperature = self.temperature * experience.reward_range();
             let explore = task.settings.explore;
@@ -195,7 +194,7 @@ impl Steady {
                     .memory
                     .next(memory, action, step.reward, &actor.belief.mean),
             };
-            let next_cell = task.lattice.cell(&actor.belief.mean);
+            let next_cell = task.cell(&actor.belief.mean);
             if at_steady {
                 let next = self.row(task, next_memory, next_cell);
                 let transition = Transition {
@@ -204,9 +203,9 @@ impl Steady {
                     reward: step.reward,
                     next: (step.then != Then::End).then_some(next),
                 };
-                let target = self
-                    .table
-                    .td_update(&task.settings, task.discount(), transition);
+                let target =
+                    self.table
+                        .td_update(task.settings.rates(), task.discount(), transition);
                 let coin = uniform(&mut exploration) < 0.5;
                 self.evidence[memory].add(coin, cell, action, target);
                 self.crossings.arrive(memory, action, next_cell);
@@ -223,7 +222,7 @@ impl Steady {
 
     /// Without memory, notable rewards are written down, so that the next memory knows their places.
     fn note_event(&self, task: &Task<'_>, experience: &mut Experience, reward: f64, mean: &[f64]) {
-        let notable = reward > 0.0 && reward >= task.settings.notable * experience.rewards.1;
+        let notable = experience.is_notable(reward, task.settings.notable);
         if self.memory.kind == Kind::None && notable && experience.events.len() < EVENTS {
             experience.events.push((reward, mean.to_vec()));
         }

@@ -2,10 +2,10 @@
 //! neither be worth a region nor show in trials.
 
 use super::draft::Draft;
-use super::evidence::critical;
 use super::regions::actions_by_cell;
 use super::steady::Steady;
-use super::task::{Task, Trial, discounted, undiscounted};
+use super::task::Task;
+use crate::solve::learn::{Trial, critical};
 
 /// Memories less used than this may be merged into any other.
 const LITTLE_USED: f64 = 0.1;
@@ -56,11 +56,7 @@ impl Tidying<'_> {
     fn loses_nothing(&self, trial: &Trial) -> bool {
         let settings = &self.task.settings;
         let surely = 2.0 * critical(settings.merge_error);
-        [discounted, undiscounted].into_iter().all(|of| {
-            let before = self.before.mean(of);
-            trial.mean(of) >= before - settings.worth * before.abs()
-                && trial.excess(&self.before, of) > -surely
-        })
+        trial.loses_nothing(&self.before, settings.worth, surely)
     }
 
     fn merge_memories(&mut self) {

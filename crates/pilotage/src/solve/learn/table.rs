@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::settings::Settings;
 use crate::model::ActionId;
 use crate::random::{Rng, uniform};
 
@@ -11,7 +10,7 @@ const FADED: f64 = 0.01;
 
 /// Values `Q(row, action)`, where a row is a memory and a neighbourhood, and the visits that set their learning rates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Table {
+pub struct Table {
     actions: usize,
     values: Vec<f64>,
     visits: Vec<u64>,
@@ -20,9 +19,20 @@ pub(super) struct Table {
     traces: Vec<(usize, f64)>,
 }
 
+/// Learning rates and traces of [`Table::td_update`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rates {
+    /// Watkins' lambda, in `[0, 1]`; 0 is one-step Q-learning.
+    pub lambda: f64,
+    /// Learning rate `max(floor, (1 + n)^-power)` at the n-th visit.
+    pub power: f64,
+    /// Smallest learning rate.
+    pub floor: f64,
+}
+
 /// A step as the table learns from it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Transition {
+pub struct Transition {
     pub row: usize,
     pub action: ActionId,
     pub reward: f64,
@@ -53,6 +63,18 @@ impl Table {
             .fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// The best action in a row, the first of equals.
+    pub fn best_action(&self, row: usize) -> ActionId {
+        let values = self.row(row);
+        (1..values.len()).fold(0, |best, action| {
+            if values[action] > values[best] {
+                action
+            } else {
+                best
+            }
+        })
+    }
+
     /// Forgets what led here; an episode has ended.
     pub fn forget_traces(&mut self) {
         self.traces.clear();
@@ -60,7 +82,7 @@ impl Table {
 
     /// TD-Update: Watkins' Q(lambda) with replacing traces, which an exploring action cuts. Returns the target
     /// `r + discount max Q(next)`.
-    pub fn td_update(&mut self, settings: &Settings, discount: f64, step: Transition) -> f64 {
+    pub fn td_update(&mut self, rates: Rates, discount: f64, step: Transition) -> f64 {
         let at = step.row * self.actions + step.action;
         let target = step.reward + step.next.map_or(0.0, |next| discount * self.best(next));
         let error = target - self.values[at];
@@ -71,9 +93,9 @@ impl Table {
         self.traces.push((at, 1.0));
         self.visits[at] += 1;
         for (entry, trace) in &mut self.traces {
-            let rate = (1.0 + self.visits[*entry] as f64).powf(-settings.rate_power);
-            self.values[*entry] += rate.max(settings.rate_floor) * *trace * error;
-            *trace *= discount * settings.lambda;
+            let rate = (1.0 + self.visits[*entry] as f64).powf(-rates.power);
+            self.values[*entry] += rate.max(rates.floor) * *trace * error;
+            *trace *= discount * rates.lambda;
         }
         self.traces.retain(|trace| trace.1 > FADED);
         target
@@ -81,7 +103,7 @@ impl Table {
 }
 
 /// Boltzmann-Action-Selection at a temperature, with a share of uniform draws.
-pub(super) fn boltzmann(values: &[f64], temperature: f64, explore: f64, rng: &mut Rng) -> ActionId {
+pub fn boltzmann(values: &[f64], temperature: f64, explore: f64, rng: &mut Rng) -> ActionId {
     if uniform(rng) < explore {
         return any_action(values.len(), rng);
     }
@@ -96,7 +118,7 @@ pub(super) fn boltzmann(values: &[f64], temperature: f64, explore: f64, rng: &mu
 }
 
 /// One of so many actions, each as likely as another.
-pub(super) fn any_action(actions: usize, rng: &mut Rng) -> ActionId {
+pub fn any_action(actions: usize, rng: &mut Rng) -> ActionId {
     ((uniform(rng) * actions as f64) as usize).min(actions - 1)
 }
 
@@ -104,6 +126,12 @@ pub(super) fn any_action(actions: usize, rng: &mut Rng) -> ActionId {
 mod tests {
     use super::*;
     use crate::random::{Role, stream};
+
+    const RATES: Rates = Rates {
+        lambda: 0.0,
+        power: 0.7,
+        floor: 0.01,
+    };
 
     fn step(row: usize, action: usize, reward: f64, next: Option<usize>) -> Transition {
         Transition {
@@ -116,13 +144,13 @@ mod tests {
 
     #[test]
     fn one_step_learning_moves_toward_the_target() {
-        let settings = Settings::default();
+        let rates = RATES;
         let mut table = Table::new(2, 2);
-        assert_eq!(table.td_update(&settings, 0.5, step(1, 0, 8.0, None)), 8.0);
+        assert_eq!(table.td_update(rates, 0.5, step(1, 0, 8.0, None)), 8.0);
         let learned = 8.0 * 2.0_f64.powf(-0.7);
         assert_eq!(table.row(1), [learned, 0.0]);
         assert_eq!(
-            table.td_update(&settings, 0.5, step(0, 1, 1.0, Some(1))),
+            table.td_update(rates, 0.5, step(0, 1, 1.0, Some(1))),
             1.0 + 0.5 * learned
         );
         assert_eq!(
@@ -134,18 +162,18 @@ mod tests {
 
     #[test]
     fn traces_carry_an_error_back_until_an_exploring_action_cuts_them() {
-        let settings = Settings {
+        let rates = Rates {
             lambda: 1.0,
-            ..Settings::default()
+            ..RATES
         };
         let mut table = Table::new(3, 2);
-        table.td_update(&settings, 0.5, step(0, 0, 0.0, Some(1)));
-        table.td_update(&settings, 0.5, step(1, 0, 8.0, Some(2)));
+        table.td_update(rates, 0.5, step(0, 0, 0.0, Some(1)));
+        table.td_update(rates, 0.5, step(1, 0, 8.0, Some(2)));
         let rate = 2.0_f64.powf(-0.7);
         assert!((table.row(1)[0] - 8.0 * rate).abs() < 1e-12);
         assert!((table.row(0)[0] - 0.5 * 8.0 * rate).abs() < 1e-12);
         let before = table.row(0)[0];
-        table.td_update(&settings, 0.5, step(1, 1, 100.0, None));
+        table.td_update(rates, 0.5, step(1, 1, 100.0, None));
         assert_eq!(table.row(0)[0], before);
     }
 

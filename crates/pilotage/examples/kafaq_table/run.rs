@@ -1,0 +1,151 @@
+//! Learning with one seed, and what came of it.
+
+use std::time::Instant;
+
+use pilotage::belief::BeliefMdp;
+use pilotage::model::Model;
+use pilotage::observe::Silent;
+use pilotage::policy::{Automaton, Controller};
+use pilotage::simulate::{Evaluation, LifeOptions, evaluate, life};
+use pilotage::solve::compile;
+use pilotage::solve::kafaq::{self, Learned, Settings};
+use pilotage::world::{ProblemWorld, World};
+use serde_json::json;
+
+use super::EVALUATION;
+
+/// Steps of every run with the pole: a little more than the thesis' four hours.
+const POLE_STEPS: u64 = 750_000;
+
+/// One seed.
+pub struct Run {
+    seed: u64,
+    pub learned: Learned,
+    pub earned: Evaluation,
+    /// In the world of the robot, unchanged.
+    pub on_robot: Option<Evaluation>,
+    pub components: usize,
+    pub seconds: f64,
+}
+
+impl Run {
+    /// Learns and evaluates.
+    pub fn new(model: &Model, robot: Option<&Model>, seed: u64) -> Self {
+        let (mut learned, seconds) = learn(model, seed);
+        compile::annotate(&mut learned.automaton, &BeliefMdp::new(model), 500, seed);
+        let automaton = &learned.automaton;
+        let controller = Controller::new(automaton);
+        let earned =
+            |world: &Model| evaluate(world, &automaton.filter, &controller, EVALUATION, &Silent);
+        Self {
+            seed,
+            earned: earned(model),
+            on_robot: robot.map(earned),
+            components: closed_components(automaton),
+            learned,
+            seconds,
+        }
+    }
+
+    pub fn json(&self) -> serde_json::Value {
+        json!({
+            "seed": self.seed,
+            "earned": self.earned,
+            "on_robot": self.on_robot,
+            "nodes": self.learned.automaton.nodes.len(),
+            "components": self.components,
+            "converged": self.learned.converged,
+            "samples": self.learned.samples,
+            "memory": self.learned.learning.memory,
+            "seconds": self.seconds,
+        })
+    }
+}
+
+/// One seed with the pole.
+pub struct Pole {
+    seed: u64,
+    pub learned: Learned,
+    pub failures: u64,
+    pub seconds: f64,
+}
+
+impl Pole {
+    /// Learns, and balances for longer than the thesis' four hours.
+    pub fn new(model: &Model, seed: u64) -> Self {
+        let (learned, seconds) = learn(model, seed);
+        let options = LifeOptions {
+            runs: 1,
+            steps: POLE_STEPS,
+            seed: EVALUATION.seed + seed,
+        };
+        let controller = Controller::new(&learned.automaton);
+        let life = life(
+            model,
+            &learned.automaton.filter,
+            &controller,
+            options,
+            &Silent,
+        );
+        Self {
+            seed,
+            failures: life.failures(),
+            learned,
+            seconds,
+        }
+    }
+
+    pub fn json(&self) -> serde_json::Value {
+        json!({
+            "seed": self.seed,
+            "steps": POLE_STEPS,
+            "failures": self.failures,
+            "nodes": self.learned.automaton.nodes.len(),
+            "converged": self.learned.converged,
+            "samples": self.learned.samples,
+            "seconds": self.seconds,
+        })
+    }
+}
+
+fn learn(model: &Model, seed: u64) -> (Learned, f64) {
+    let clock = Instant::now();
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+    let settings = Settings {
+        seed,
+        ..Settings::default()
+    };
+    let learned = kafaq::learn(model, &worlds, &settings, None, &Silent).unwrap();
+    (learned, clock.elapsed().as_secs_f64())
+}
+
+/// Ways out of a node that fewer of its departures take do not count.
+const RARELY: f64 = 0.01;
+
+/// Parts of an automaton that are rarely left again: strongly connected components without a way out, by the steps that were seen.
+fn closed_components(automaton: &Automaton) -> usize {
+    let n = automaton.nodes.len();
+    let mut reaches: Vec<Vec<bool>> = (0..n)
+        .map(|from| (0..n).map(|to| from == to).collect())
+        .collect();
+    let mut departures = vec![0.0; n];
+    for &(from, count) in automaton.nodes.iter().flat_map(|node| &node.predecessors) {
+        departures[from] += count;
+    }
+    for (to, node) in automaton.nodes.iter().enumerate() {
+        for &(from, count) in &node.predecessors {
+            reaches[from][to] |= count >= RARELY * departures[from];
+        }
+    }
+    for middle in 0..n {
+        let onward = reaches[middle].clone();
+        for row in reaches.iter_mut().filter(|row| row[middle]) {
+            row.iter_mut().zip(&onward).for_each(|(to, on)| *to |= on);
+        }
+    }
+    let closed = |node: usize| (0..n).all(|to| !reaches[node][to] || reaches[to][node]);
+    let first = |node: usize| !(0..node).any(|other| reaches[node][other] && reaches[other][node]);
+    (0..n)
+        .filter(|&node| automaton.nodes[node].visits > 0.0 && closed(node) && first(node))
+        .count()
+}

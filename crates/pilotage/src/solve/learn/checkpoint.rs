@@ -1,0 +1,133 @@
+//! Checkpoints: the state of a learning run as a file, whole or not at all.
+//!
+//! Two lines of JSON. The first says whose run it is and has a checksum of the second, which is the state.
+
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::policy::write_whole;
+
+/// Version of the file format.
+const FORMAT: u32 = 1;
+
+#[derive(Serialize, Deserialize)]
+struct Header<S> {
+    checkpoint: u32,
+    pilotage: String,
+    solver: String,
+    problem: String,
+    fingerprint: u64,
+    settings: S,
+    checksum: u64,
+}
+
+/// Whose run a checkpoint is.
+pub struct Owner<'a, S> {
+    pub solver: &'static str,
+    pub problem: &'a str,
+    /// Fingerprint of the problem.
+    pub fingerprint: u64,
+    pub settings: &'a S,
+}
+
+impl<S: Clone + PartialEq + Serialize + DeserializeOwned> Owner<'_, S> {
+    /// Writes the state of a run. Whatever happens, the file is then the old checkpoint or the new one.
+    pub fn save(&self, state: &impl Serialize, path: &Path) -> Result<()> {
+        let fail = |error: serde_json::Error| Error::Io {
+            path: path.to_owned(),
+            source: error.into(),
+        };
+        let state = serde_json::to_string(state).map_err(fail)?;
+        let header = Header {
+            checkpoint: FORMAT,
+            pilotage: env!("CARGO_PKG_VERSION").to_owned(),
+            solver: self.solver.to_owned(),
+            problem: self.problem.to_owned(),
+            fingerprint: self.fingerprint,
+            settings: self.settings.clone(),
+            checksum: checksum(&state),
+        };
+        let header = serde_json::to_string(&header).map_err(fail)?;
+        write_whole(path, format!("{header}\n{state}\n").as_bytes())
+    }
+
+    /// Reads the state of a run of this owner.
+    pub fn load<T: DeserializeOwned>(&self, path: &Path) -> Result<T> {
+        let bytes = std::fs::read(path).map_err(|source| Error::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+        self.read(&bytes).map_err(|reason| Error::Checkpoint {
+            path: path.to_owned(),
+            reason,
+        })
+    }
+
+    fn read<T: DeserializeOwned>(&self, bytes: &[u8]) -> std::result::Result<T, String> {
+        let damaged = |what: &str| format!("damaged checkpoint: {what}; delete it to start afresh");
+        let text = std::str::from_utf8(bytes).map_err(|_| damaged("it is not text"))?;
+        let (header, state) = text
+            .split_once('\n')
+            .ok_or_else(|| damaged("it ends too early"))?;
+        // The version comes first: another version may have other keys.
+        let value: serde_json::Value = serde_json::from_str(header)
+            .map_err(|error| format!("not a checkpoint of pilotage ({error})"))?;
+        let format = value.get("checkpoint").and_then(serde_json::Value::as_u64);
+        let version = value.get("pilotage").and_then(serde_json::Value::as_str);
+        let this = env!("CARGO_PKG_VERSION");
+        match (format, version) {
+            (Some(format), Some(version)) if format == u64::from(FORMAT) && version == this => {}
+            (Some(format), Some(version)) => {
+                return Err(format!(
+                    "checkpoint format {format} of pilotage {version}; this is pilotage {this}, which goes on with its own, format {FORMAT}; \
+                     finish with that version or delete the file to start afresh"
+                ));
+            }
+            _ => return Err("not a checkpoint of pilotage".to_owned()),
+        }
+        let solver = value
+            .get("solver")
+            .and_then(serde_json::Value::as_str)
+            .unwrap_or("");
+        if solver != self.solver {
+            return Err(format!(
+                "a checkpoint of the solver `{solver}`, not of `{}`",
+                self.solver
+            ));
+        }
+        let header: Header<S> =
+            serde_json::from_value(value).map_err(|error| damaged(&error.to_string()))?;
+        if header.problem != self.problem {
+            return Err(format!(
+                "a checkpoint of the problem {}, not of {}",
+                header.problem, self.problem
+            ));
+        }
+        if header.fingerprint != self.fingerprint {
+            return Err(format!(
+                "{} has changed since this checkpoint was written; delete it to start afresh",
+                self.problem
+            ));
+        }
+        if header.settings != *self.settings {
+            return Err("a checkpoint of a run with other settings or another seed; resume with those, or delete it to start afresh".to_owned());
+        }
+        let state = state
+            .strip_suffix('\n')
+            .ok_or_else(|| damaged("it ends too early"))?;
+        if checksum(state) != header.checksum {
+            return Err(damaged("its checksum is wrong"));
+        }
+        serde_json::from_str(state).map_err(|error| damaged(&error.to_string()))
+    }
+}
+
+/// FNV-1a.
+fn checksum(text: &str) -> u64 {
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}

@@ -1,0 +1,361 @@
+//! ARKAQ-learning: what it finds, what it says when there is too much, and that a stopped run ends like one that was not.
+#![allow(clippy::unwrap_used)]
+
+use std::sync::Mutex;
+
+use pilotage::Error;
+use pilotage::belief::BeliefMdp;
+use pilotage::model::{self, Interval, Model};
+use pilotage::observe::{Observer, Silent};
+use pilotage::policy::{Automaton, Controller};
+use pilotage::simulate::{Evaluation, Options, evaluate};
+use pilotage::solve::arkaq::{self, Learned, Run, Settings};
+use pilotage::solve::kbvi::closed;
+use pilotage::world::{ProblemWorld, World};
+
+const OPTIONS: Options = Options {
+    episodes: 500,
+    seed: 77,
+};
+
+fn model(name: &str) -> Model {
+    model::find(name).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn learn_in(
+    world: &Model,
+    told: &Model,
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> pilotage::Result<Learned> {
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(world)) };
+    arkaq::learn(told, &worlds, settings, None, observer)
+}
+
+fn learn(model: &Model, settings: &Settings) -> Learned {
+    learn_in(model, model, settings, &Silent).unwrap()
+}
+
+fn at(vigilance: f64) -> Settings {
+    Settings {
+        vigilances: vec![vigilance],
+        ..Settings::default()
+    }
+}
+
+/// Settings of a run that ends soon, wherever it has come.
+fn hurried() -> Settings {
+    Settings {
+        vigilances: vec![0.3, 0.6],
+        merge: true,
+        lambda: 0.5,
+        epoch: 500,
+        epoch_per_entry: 1,
+        epoch_limit: 4,
+        settle: 300,
+        trial: 10,
+        ..Settings::default()
+    }
+}
+
+fn earned(model: &Model, automaton: &Automaton) -> Evaluation {
+    let controller = Controller::new(automaton);
+    evaluate(model, &automaton.filter, &controller, OPTIONS, &Silent)
+}
+
+fn planned(model: &Model) -> Evaluation {
+    let mdp = BeliefMdp::new(model);
+    let plan = closed::solve(&mdp, &closed::Settings::default(), &Silent).unwrap();
+    evaluate(model, &plan.mdp().filter(), &plan, OPTIONS, &Silent)
+}
+
+#[test]
+fn the_hallway_has_few_clusters_at_low_vigilance_and_more_at_high_and_the_goal_is_apart() {
+    let model = model("basic");
+    let best = planned(&model).discounted.mean;
+    let mut clusters = 0;
+    for (vigilance, most) in [(0.1, 4), (0.5, 30), (0.9, 200)] {
+        let learned = learn(&model, &at(vigilance));
+        let found = learned.clusters.len();
+        assert!(
+            clusters < found && found <= most,
+            "{found} clusters at {vigilance}"
+        );
+        clusters = found;
+        let rewarded = |share: f64| learned.clusters.iter().filter(move |c| c.rewarded == share);
+        assert!(rewarded(1.0).count() >= 1, "no goal at {vigilance}");
+        assert_eq!(
+            rewarded(0.0).count() + rewarded(1.0).count(),
+            found,
+            "mixed with the goal"
+        );
+        // The goal is the cell at the right end; a belief lags behind, so that not all of its clusters need lie there.
+        let middle = |share: f64| {
+            let places: Vec<f64> = rewarded(share).map(|c| c.centre.now.place[0]).collect();
+            places.iter().sum::<f64>() / places.len() as f64
+        };
+        assert!(middle(1.0) > 0.6 && middle(0.0) < 0.6);
+        let earned = earned(&model, &learned.automaton).discounted.mean;
+        assert!(earned >= 0.97 * best, "{earned} of {best} at {vigilance}");
+    }
+}
+
+#[test]
+fn a_hidden_load_becomes_clusters_at_the_same_place_with_opposite_actions() {
+    let model = model("cart-load-unload");
+    let learned = learn(&model, &at(0.7));
+    let best = planned(&model).discounted.mean;
+    let earned = earned(&model, &learned.automaton).discounted.mean;
+    assert!(earned >= 0.85 * best, "{earned} of {best}");
+    let recall = learned.automaton.filter.recall().unwrap();
+    let nodes = recall.clusters().iter().zip(&learned.automaton.nodes);
+    let nodes: Vec<_> = nodes.map(|(c, n)| (c.now.place[0], n.action)).collect();
+    let opposite = |a: &(f64, usize)| {
+        nodes
+            .iter()
+            .any(|b| (a.0 - b.0).abs() < 0.05 && a.1 != b.1 && (0.3..0.7).contains(&b.0))
+    };
+    assert!(nodes.iter().any(opposite), "{nodes:?}");
+    // One that forgets cannot tell.
+    let forgetful = Settings {
+        before: 0.0,
+        action: 0.0,
+        ..at(0.7)
+    };
+    let without = self::earned(&model, &learn(&model, &forgetful).automaton)
+        .discounted
+        .mean;
+    assert!(without < 0.7 * best, "{without} of {best}");
+}
+
+#[test]
+fn merging_leaves_fewer_nodes_and_loses_nothing() {
+    let model = model("cart-load-unload");
+    let merging = Settings {
+        merge: true,
+        ..at(0.7)
+    };
+    let (learned, merged) = (learn(&model, &at(0.7)), learn(&model, &merging));
+    assert_eq!(learned.clusters, merged.clusters);
+    assert!(4 * merged.automaton.nodes.len() <= learned.automaton.nodes.len());
+    let [before, after] = [&learned, &merged].map(|l| earned(&model, &l.automaton).discounted);
+    // Merging may cost a hundredth in its own trials; the rest is what 500 episodes leave open.
+    let open = 4.0 * (before.stderr + after.stderr);
+    assert!(
+        after.mean >= 0.99 * before.mean - open,
+        "{after:?} after {before:?}"
+    );
+}
+
+#[test]
+fn too_many_clusters_end_exploration_with_a_clear_statement() {
+    struct Notes(Mutex<Vec<String>>);
+    impl Observer for Notes {
+        fn note(&self, message: &str) {
+            self.0.lock().unwrap().push(message.to_owned());
+        }
+    }
+    let model = model("cart-pole-sd");
+    let settings = Settings {
+        cluster_limit: 40,
+        epoch_limit: 2,
+        ..at(0.9)
+    };
+    let notes = Notes(Mutex::default());
+    let learned = learn_in(&model, &model, &settings, &notes).unwrap();
+    assert!(learned.capped && !learned.converged);
+    assert_eq!(learned.automaton.nodes.len(), 40);
+    let notes = notes.0.into_inner().unwrap();
+    let said = notes
+        .iter()
+        .any(|note| note.contains("limit of 40 clusters") && note.contains("cluster_limit"));
+    assert!(said, "{notes:?}");
+}
+
+#[test]
+fn vigilance_that_tunes_itself_stops_at_the_limit_and_keeps_the_best() {
+    let model = model("cart-load-unload");
+    let settings = Settings {
+        vigilances: vec![0.1, 0.5, 0.9, 0.95],
+        cluster_limit: 60,
+        ..Settings::default()
+    };
+    let learned = learn(&model, &settings);
+    // 0.1 cannot tell loaded from empty; 0.9 needs too many, so that 0.95 is not tried.
+    assert!(learned.vigilance > 0.1);
+    assert!(learned.curve.iter().any(|point| point.vigilance == 0.9));
+    assert!(learned.curve.iter().all(|point| point.vigilance < 0.95));
+}
+
+#[test]
+fn an_automaton_runs_from_its_file_as_it_was_learned() {
+    let model = model("cart-load-unload");
+    let learned = learn(&model, &hurried());
+    let text = learned.automaton.to_json().unwrap();
+    let read = Automaton::from_json(&text, "test").unwrap();
+    assert_eq!(read, learned.automaton);
+    assert_eq!(earned(&model, &read), earned(&model, &learned.automaton));
+    // One cluster less than modes is a damaged file.
+    let mut damaged: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let clusters = damaged
+        .pointer_mut("/automaton/filter/recall/clusters")
+        .unwrap();
+    clusters.as_array_mut().unwrap().pop();
+    let error = Automaton::from_json(&damaged.to_string(), "test").unwrap_err();
+    assert!(matches!(error, Error::Policy { .. }), "{error}");
+}
+
+#[test]
+fn a_run_is_its_seed_and_a_resumed_one_ends_like_one_never_stopped() {
+    let model = model("cart-load-unload");
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&model)) };
+    let whole = learn(&model, &hurried());
+    assert_eq!(whole, learn(&model, &hurried()));
+    let other = Settings {
+        seed: 2,
+        ..hurried()
+    };
+    assert_ne!(whole.curve, learn(&model, &other).curve);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint");
+    let mut run = Run::new(&model, &worlds, &hurried()).unwrap();
+    while !run.finished() {
+        run.advance(&Silent).unwrap();
+        run.save(&path).unwrap();
+        run = Run::resume(&model, &worlds, &hurried(), &path).unwrap();
+    }
+    assert_eq!(run.learned(), whole);
+    // Another's checkpoint is refused.
+    assert!(matches!(
+        Run::resume(&model, &worlds, &other, &path).map(|_| ()),
+        Err(Error::Checkpoint { .. })
+    ));
+}
+
+/// The learner is told neither rewards nor events: a model without them makes no difference.
+#[test]
+fn rewards_and_map_are_learned_and_not_read() {
+    let world = model("cart-load-unload");
+    let mut told = world.clone();
+    told.rewards.clear();
+    told.events.clear();
+    let (all, little) = (
+        learn_in(&world, &world, &hurried(), &Silent).unwrap(),
+        learn_in(&world, &told, &hurried(), &Silent).unwrap(),
+    );
+    assert_eq!(all.curve, little.curve);
+    assert_eq!(all.automaton.nodes, little.automaton.nodes);
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    let bad = [
+        (
+            "vigilance",
+            Settings {
+                vigilances: vec![1.5],
+                ..Settings::default()
+            },
+        ),
+        (
+            "vigilance",
+            Settings {
+                vigilances: vec![f64::NAN],
+                ..Settings::default()
+            },
+        ),
+        (
+            "vigilances",
+            Settings {
+                vigilances: Vec::new(),
+                ..Settings::default()
+            },
+        ),
+        (
+            "vigilances",
+            Settings {
+                vigilances: vec![0.5, 0.5],
+                ..Settings::default()
+            },
+        ),
+        (
+            "rate",
+            Settings {
+                rate: -0.1,
+                ..Settings::default()
+            },
+        ),
+        (
+            "before",
+            Settings {
+                before: 2.0,
+                ..Settings::default()
+            },
+        ),
+        (
+            "past",
+            Settings {
+                past: 1.0,
+                ..Settings::default()
+            },
+        ),
+        (
+            "action",
+            Settings {
+                action: f64::INFINITY,
+                ..Settings::default()
+            },
+        ),
+        (
+            "notable",
+            Settings {
+                notable: 0.0,
+                ..Settings::default()
+            },
+        ),
+        (
+            "cluster_limit",
+            Settings {
+                cluster_limit: 0,
+                ..Settings::default()
+            },
+        ),
+        (
+            "lambda",
+            Settings {
+                lambda: 1.1,
+                ..Settings::default()
+            },
+        ),
+        (
+            "cold",
+            Settings {
+                cold: 2.0,
+                ..Settings::default()
+            },
+        ),
+        (
+            "trial",
+            Settings {
+                trial: 1,
+                ..Settings::default()
+            },
+        ),
+    ];
+    let model = model("basic");
+    for (name, settings) in bad {
+        let error = learn_in(&model, &model, &settings, &Silent).unwrap_err();
+        assert!(
+            matches!(error, Error::Setting { setting, .. } if setting == name),
+            "{name}: {error}"
+        );
+    }
+}
+
+#[test]
+fn a_world_without_bounds_is_refused() {
+    let mut model = model("basic");
+    model.state[0].bounds = Interval::ALL;
+    let error = learn_in(&model, &model, &hurried(), &Silent).unwrap_err();
+    assert!(error.to_string().contains("state.bounds"), "{error}");
+}

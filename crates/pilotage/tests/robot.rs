@@ -1,0 +1,104 @@
+//! The robot: files that differ from what was learned in by the world alone, and automata that run on it unchanged.
+#![allow(clippy::unwrap_used)]
+
+use pilotage::Error;
+use pilotage::model::{self, Model, Walls, WorldKind, WorldSpec};
+use pilotage::observe::Silent;
+use pilotage::policy::Controller;
+use pilotage::simulate::{Options, evaluate};
+use pilotage::solve::kafaq::{Settings, learn};
+use pilotage::world::{Draws, ProblemWorld, World};
+
+const PROBLEMS: [&str; 3] = ["basic", "maze-4x4", "cart-load-unload"];
+
+fn model(name: &str) -> Model {
+    model::find(name).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn robot_of(name: &str) -> Model {
+    model(&format!("robot-{name}"))
+}
+
+#[test]
+fn a_robot_file_is_its_problem_in_another_world() {
+    for name in PROBLEMS {
+        let (plain, robot) = (model(name), robot_of(name));
+        assert!(matches!(robot.world.kind, WorldKind::Robot(_)));
+        let stripped = |model: &Model| Model {
+            name: String::new(),
+            about: String::new(),
+            world: WorldSpec::default(),
+            ..model.clone()
+        };
+        assert_eq!(stripped(&plain), stripped(&robot), "{name}");
+        assert_eq!(plain.world.walls, Walls::Clamp);
+    }
+}
+
+/// Readings of the robot miss its place as the agent assumes, give or take what walls and headings do; five standard errors of a
+/// standard deviation over 5000 readings are 5 %.
+#[test]
+fn the_robot_senses_as_well_as_the_agent_assumes() {
+    let robot = robot_of("maze-4x4");
+    let mut world = ProblemWorld::new(&robot);
+    let mut draws = Draws::new(4, 0);
+    let (mut square, mut count) = (0.0, 0.0);
+    let mut reading = [0.0; 2];
+    for episode in 0..50 {
+        world.reset(&mut draws);
+        for step in 0..50 {
+            world.step((episode + step * 7) % 4, &mut draws, &mut reading);
+            for (sensed, place) in reading.iter().zip(world.state()) {
+                square += (sensed - place).powi(2);
+                count += 1.0;
+            }
+        }
+    }
+    let (sd, assumed) = ((square / count).sqrt(), robot.sensor.noise[(0, 0)].sqrt());
+    assert!((sd / assumed - 1.0).abs() < 0.1, "{sd} against {assumed}");
+}
+
+#[test]
+fn what_was_learned_elsewhere_earns_its_return_on_the_robot() {
+    let options = Options {
+        episodes: 200,
+        seed: 11,
+    };
+    for name in PROBLEMS {
+        let (plain, robot) = (model(name), robot_of(name));
+        let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&plain)) };
+        let learned = learn(&plain, &worlds, &Settings::default(), None, &Silent).unwrap();
+        let automaton = &learned.automaton;
+        automaton.check_problem(&plain, "policy").unwrap();
+        automaton.check_world(&robot, "policy").unwrap();
+        let controller = Controller::new(automaton);
+        let [there, here] = [&plain, &robot]
+            .map(|world| evaluate(world, &automaton.filter, &controller, options, &Silent));
+        assert!(
+            here.discounted.mean >= 0.85 * there.discounted.mean
+                && here.undiscounted.mean >= 0.85 * there.undiscounted.mean,
+            "{name}: {here:?} against {there:?}"
+        );
+    }
+}
+
+#[test]
+fn a_policy_is_refused_a_world_that_it_has_no_actions_or_sensors_for() {
+    let plain = model("basic");
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&plain)) };
+    let automaton = learn(&plain, &worlds, &Settings::default(), None, &Silent)
+        .unwrap()
+        .automaton;
+    let refused = |world: &Model| {
+        let error = automaton.check_world(world, "p.json").unwrap_err();
+        assert!(matches!(error, Error::Policy { .. }), "{error}");
+        error.to_string()
+    };
+    assert!(refused(&robot_of("maze-4x4")).contains("actions EAST, WEST"));
+    let mut renamed = plain.clone();
+    renamed.state[0].name = "place".to_owned();
+    assert!(refused(&renamed).contains("state variables x"));
+    let mut blind = plain.clone();
+    blind.sensor.h = nalgebra::DMatrix::from_row_slice(2, 1, &[1.0, 1.0]);
+    assert!(refused(&blind).contains("2 readings"));
+}
