@@ -122,7 +122,9 @@ pub struct Recording {
     pub bounds: Vec<(f64, f64)>,
     /// Places that pay: lower and upper corner, and what they are called.
     pub places: Vec<(Vec<f64>, Vec<f64>, String)>,
-    /// Walls to draw in the plane, as segments `((x1, y1), (x2, y2))`.
+    /// Places no state can be in: lower and upper corner.
+    pub blocked: Vec<(Vec<f64>, Vec<f64>)>,
+    /// Walls as segments `((x1, y1), (x2, y2))`; of a single variable only `x1` counts.
     pub walls: Vec<((f64, f64), (f64, f64))>,
     /// The automaton's nodes by label, such as `EAST`, with its number first: `2 EAST`.
     pub nodes: Vec<String>,
@@ -135,13 +137,17 @@ pub struct Recording {
 pub struct Frame {
     /// The true state.
     pub state: Vec<f64>,
+    /// The true hidden mode by name, or empty where there is only one.
+    pub mode: String,
     /// What the agent believes: hypotheses, the likeliest first.
     pub hypotheses: Vec<Hypothesis>,
+    /// Which of the hypotheses it acts on.
+    pub valid: usize,
     /// Node the automaton is in.
     pub node: usize,
-    /// Action it takes there.
+    /// Action it takes there; empty once the episode is over.
     pub action: String,
-    /// What the step paid.
+    /// What that step paid.
     pub reward: f64,
 }
 

@@ -1,6 +1,7 @@
-//! Pictures of policies and results, as SVG: automata, maps of the belief space, curves.
+//! Pictures of policies and results, as SVG: automata, maps of the belief space, curves; and reports made of them, as a page,
+//! as Markdown and as data.
 //!
-//! Every function here turns data into the text of one self-contained SVG file. The same data always gives the same text.
+//! Every function here that draws turns data into the text of one self-contained SVG file. The same data always gives the same text.
 //! Colours are told apart by colour-blind readers and follow the reader's light or dark scheme; converters that know
 //! nothing of schemes draw the light one.
 
@@ -11,8 +12,10 @@ mod curve;
 mod finding;
 mod layout;
 mod learning;
+mod page;
 mod palette;
 mod plot;
+mod record;
 mod sheet;
 mod svg;
 
@@ -26,6 +29,8 @@ pub use finding::{
     Algorithm, Figure, Finding, Frame, Hypothesis, Recording, Report, Table, Verdict,
 };
 pub use learning::{returns_svg, values_svg};
+pub use page::{page_html, page_markdown, tables_csv};
+pub use record::{Take, episodes, record};
 
 use crate::policy::Place;
 

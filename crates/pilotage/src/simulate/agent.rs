@@ -15,8 +15,13 @@ pub trait Agent: Send {
     /// Takes in what was sensed (length `m`) after the action.
     fn observe(&mut self, action: ActionId, observation: &[f64]);
 
-    /// What the agent believes now.
+    /// The belief it acts on now.
     fn belief(&self) -> &Belief;
+
+    /// All that it believes now, with weights that sum to 1.
+    fn hypotheses(&self) -> Vec<(f64, &Belief)> {
+        vec![(1.0, self.belief())]
+    }
 }
 
 /// A Kalman filter and a policy.

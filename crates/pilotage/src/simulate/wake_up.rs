@@ -162,6 +162,12 @@ impl Agent for WakeUpAgent<'_> {
     fn belief(&self) -> &Belief {
         self.valid()
     }
+
+    fn hypotheses(&self) -> Vec<(f64, &Belief)> {
+        let live = self.tracker.hypotheses().iter();
+        live.map(|hypothesis| (hypothesis.weight, &hypothesis.belief))
+            .collect()
+    }
 }
 
 /// The start hypothesis from which the policy expects least, or, where it knows no values, whose mean is farthest from all goals.
