@@ -23,9 +23,12 @@ impl Bars {
 }
 
 impl Bars {
-    /// Says which part of a long run is being made.
-    pub fn chapter(&self, name: &str, done: usize, of: usize) {
-        self.note(&format!("{:>3} of {of}: {name}", done + 1));
+    /// Says which part of a long run is being made, and how many seconds are left where that can be told.
+    pub fn chapter(&self, name: &str, (done, of): (usize, usize), left: Option<f64>) {
+        let left = left.map_or(String::new(), |seconds| {
+            format!(", about {:.0} s left", seconds.ceil())
+        });
+        self.note(&format!("{:>3} of {of}: {name}{left}", done + 1));
     }
 }
 

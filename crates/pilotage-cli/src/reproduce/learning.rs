@@ -28,9 +28,9 @@ struct Problem {
 }
 
 /// One seed.
-struct Run {
-    learned: Learned,
-    earned: Evaluation,
+pub struct Run {
+    pub learned: Learned,
+    pub earned: Evaluation,
 }
 
 /// Median with the least and the greatest.
@@ -51,7 +51,13 @@ fn median(sorted: &[f64]) -> f64 {
     0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2])
 }
 
-fn evaluation(context: &Context<'_>) -> Options {
+/// Median of values in any order.
+pub fn median_of(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    median(&values)
+}
+
+pub fn evaluation(context: &Context<'_>) -> Options {
     Options {
         episodes: context.either(2_000, 300),
         seed: context.seed + 998,
@@ -59,7 +65,7 @@ fn evaluation(context: &Context<'_>) -> Options {
 }
 
 /// Seeds of the runs, the report's own first.
-fn seeds(context: &Context<'_>) -> Vec<u64> {
+pub fn seeds(context: &Context<'_>) -> Vec<u64> {
     (0..context.either(20, 2))
         .map(|k| context.seed + k)
         .collect()
@@ -76,7 +82,7 @@ fn learn(model: &Model, seed: u64) -> Result<Learned, Failure> {
     Ok(learned)
 }
 
-fn earned(world: &Model, automaton: &Automaton, options: Options) -> Evaluation {
+pub fn earned(world: &Model, automaton: &Automaton, options: Options) -> Evaluation {
     evaluate(
         world,
         &automaton.filter,
@@ -86,7 +92,7 @@ fn earned(world: &Model, automaton: &Automaton, options: Options) -> Evaluation 
     )
 }
 
-fn runs(context: &Context<'_>, model: &Model) -> Result<Vec<Run>, Failure> {
+pub fn runs(context: &Context<'_>, model: &Model) -> Result<Vec<Run>, Failure> {
     seeds(context)
         .into_par_iter()
         .map(|seed| {
@@ -97,22 +103,40 @@ fn runs(context: &Context<'_>, model: &Model) -> Result<Vec<Run>, Failure> {
         .collect()
 }
 
+/// The planner that is the yardstick. For a quick look its grid of the plane is coarser: the policy is hardly worse, and it takes a
+/// tenth of the time.
+fn planner(context: &Context<'_>, model: &Model) -> closed::Settings {
+    closed::Settings {
+        points: (context.quick && model.state_dim() == 2).then_some(25),
+        ..closed::Settings::default()
+    }
+}
+
+/// What the yardstick of a problem earns.
+pub fn yardstick(context: &Context<'_>, model: &Model) -> Result<Evaluation, Failure> {
+    let all = yardsticks(
+        model,
+        &planner(context, model),
+        evaluation(context),
+        context.observer,
+    )?;
+    let first = all.into_iter().next();
+    first
+        .map(|one| one.earned)
+        .ok_or_else(|| Failure::Usage(format!("{} has no yardstick", model.name)))
+}
+
 fn reproduced(context: &Context<'_>, problem_: &Problem) -> Result<Finding, Failure> {
     let model = problem(problem_.model)?;
     let runs = runs(context, &model)?;
-    // A coarser grid of the plane for a quick look: its policy is hardly worse, and it takes a tenth of the time.
-    let planner = closed::Settings {
-        points: (context.quick && model.state_dim() == 2).then_some(25),
-        ..closed::Settings::default()
-    };
+    let planner = planner(context, &model);
     let told = yardsticks(&model, &planner, evaluation(context), context.observer)?;
     let of = |value: &dyn Fn(&Run) -> f64| -> Vec<f64> { runs.iter().map(value).collect() };
     let best = told
         .first()
         .map_or(f64::NAN, |yardstick| yardstick.earned.discounted.mean);
     let shares = of(&|run| 100.0 * run.earned.discounted.mean / best);
-    let mut sorted = shares.clone();
-    sorted.sort_by(f64::total_cmp);
+    let share = median_of(shares.clone());
     let regions = of(&|run| run.learned.automaton.nodes.len() as f64);
     let converged = runs.iter().filter(|run| run.learned.converged).count();
     let row = vec![[
@@ -159,9 +183,7 @@ fn reproduced(context: &Context<'_>, problem_: &Problem) -> Result<Finding, Fail
                 returns_svg(automaton, learning)?,
             );
     }
-    let mut few = regions;
-    few.sort_by(f64::total_cmp);
-    let (share, nodes) = (median(&sorted), median(&few));
+    let nodes = median_of(regions);
     let good = share >= 100.0 * problem_.solved;
     let found = format!("a median of {nodes} regions earns {share:.1}% of the yardstick");
     Ok(draft.verdict(judge(

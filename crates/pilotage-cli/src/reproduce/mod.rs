@@ -1,23 +1,29 @@
 //! `pilotage reproduce`: every table and figure of the thesis, made again.
 
+mod algorithms;
+mod chapter3;
 mod chapter4;
 mod chapter5;
 mod chapter6;
 mod context;
+mod experiments;
 mod learning;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use clap::Args;
 use pilotage::model::suggest;
 use pilotage::policy::write_whole;
-use pilotage::report::Finding;
+use pilotage::report::{Finding, Report, Verdict, episodes, page_html, page_markdown, tables_csv};
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
 use crate::progress::Bars;
+use algorithms::algorithms;
 use context::Context;
+use experiments::{EXPERIMENTS, Experiment};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -40,121 +46,6 @@ pub struct Arguments {
     #[arg(long)]
     list: bool,
 }
-
-/// A table or figure, and how to make it again.
-struct Experiment {
-    id: &'static str,
-    about: &'static str,
-    make: fn(&Context<'_>) -> Result<Finding, Failure>,
-}
-
-const EXPERIMENTS: &[Experiment] = &[
-    Experiment {
-        id: "table-4.1",
-        about: "uncertainty levels",
-        make: chapter4::table_4_1,
-    },
-    Experiment {
-        id: "figure-4.8",
-        about: "KAFAQ in the basic world (and 4.9)",
-        make: learning::figure_4_8,
-    },
-    Experiment {
-        id: "figure-4.10",
-        about: "KAFAQ in the 4x4 maze (and 4.11)",
-        make: learning::figure_4_10,
-    },
-    Experiment {
-        id: "figure-4.12",
-        about: "KAFAQ and the hidden load (and 4.13)",
-        make: learning::figure_4_12,
-    },
-    Experiment {
-        id: "figure-4.14",
-        about: "KAFAQ and the four stations (and 4.15)",
-        make: learning::figure_4_14,
-    },
-    Experiment {
-        id: "figure-4.16",
-        about: "KAFAQ and the shuttle (and 4.17)",
-        make: learning::figure_4_16,
-    },
-    Experiment {
-        id: "section-4.3.6",
-        about: "KAFAQ balances the pole",
-        make: learning::section_4_3_6,
-    },
-    Experiment {
-        id: "figure-5.2",
-        about: "reward at a belief",
-        make: chapter5::figure_5_2,
-    },
-    Experiment {
-        id: "figure-5.4",
-        about: "beliefs reachable in one step (and 5.3)",
-        make: chapter5::figures_5_3_and_5_4,
-    },
-    Experiment {
-        id: "figure-5.6",
-        about: "levels of the one-dimensional maze",
-        make: chapter5::figure_5_6,
-    },
-    Experiment {
-        id: "figure-5.10",
-        about: "the tiger (and 5.9)",
-        make: chapter5::figures_5_9_and_5_10,
-    },
-    Experiment {
-        id: "figure-5.13",
-        about: "the one-dimensional maze (and 5.11, 5.12)",
-        make: chapter5::figures_5_11_to_5_13,
-    },
-    Experiment {
-        id: "convergence",
-        about: "policy convergence horizons",
-        make: chapter5::convergence,
-    },
-    Experiment {
-        id: "section-5.5.3",
-        about: "the two-dimensional maze",
-        make: chapter5::section_5_5_3,
-    },
-    Experiment {
-        id: "figure-5.14",
-        about: "the hidden load (and 2.10, 2.11)",
-        make: chapter5::figure_5_14,
-    },
-    Experiment {
-        id: "section-5.5.5",
-        about: "the inverted pendulum",
-        make: chapter5::section_5_5_5,
-    },
-    Experiment {
-        id: "table-5.1",
-        about: "policy of the U-shaped maze",
-        make: chapter5::table_5_1,
-    },
-    Experiment {
-        id: "figure-5.17",
-        about: "waking up lost (and 5.16)",
-        make: chapter5::figures_5_16_and_5_17,
-    },
-    Experiment {
-        id: "declare",
-        about: "a maze in which looking pays",
-        make: chapter5::declare,
-    },
-    Experiment {
-        id: "table-6.1",
-        about: "segments and nearest neighbours",
-        make: chapter6::table_6_1,
-    },
-    Experiment {
-        id: "table-a.1",
-        about: "Q-values of the pole",
-        make: chapter4::table_a_1,
-    },
-];
 
 /// A finding as it is kept between runs, with what it depends on.
 #[derive(Serialize, Deserialize)]
@@ -181,27 +72,82 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         quick: arguments.quick,
         observer: &bars,
     };
-    let data = arguments.out.join("data");
-    std::fs::create_dir_all(&data).map_err(|source| pilotage::Error::Io {
-        path: data.clone(),
-        source,
-    })?;
-    let mut findings = Vec::new();
+    let data = folder(&arguments.out.join("data"))?;
+    let clock = Instant::now();
+    let cost = |experiment: &Experiment| context.either(experiment.cost.0, experiment.cost.1);
+    let (mut findings, mut paid) = (Vec::new(), 0.0);
     for (done, experiment) in chosen.iter().enumerate() {
-        bars.chapter(experiment.id, done, chosen.len());
         let file = data.join(format!("{}.json", experiment.id));
         let finding = match kept(&file, arguments) {
             Some(finding) => finding,
             None => {
+                let left: f64 = chosen[done..].iter().map(|one| cost(one)).sum();
+                bars.chapter(
+                    experiment.id,
+                    (done, chosen.len()),
+                    foretold(clock, paid, left),
+                );
                 let mut finding = (experiment.make)(&context)?;
                 experiment.id.clone_into(&mut finding.id);
                 keep(&file, arguments, &finding)?;
+                paid += cost(experiment);
                 finding
             }
         };
         findings.push(finding);
     }
+    let report = Report {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: arguments.seed,
+        quick: arguments.quick,
+        recordings: episodes(arguments.seed, &bars)?,
+        algorithms: algorithms(&findings),
+        findings,
+    };
+    write(&report, &arguments.out)
+}
+
+/// Seconds left, once enough has been made to tell.
+fn foretold(clock: Instant, paid: f64, left: f64) -> Option<f64> {
+    (paid > 0.0).then(|| clock.elapsed().as_secs_f64() / paid * left)
+}
+
+/// Writes the page, the Markdown with its figures, and the tables.
+fn write(report: &Report, out: &Path) -> Result<(), Failure> {
+    const FIGURES: &str = "figures";
+    let mut printed = std::io::stdout().lock();
+    let (markdown, pictures) = page_markdown(report, FIGURES);
+    let figures = folder(&out.join(FIGURES))?;
+    for (name, svg) in pictures {
+        write_whole(&figures.join(name), svg.as_bytes())?;
+    }
+    let data = folder(&out.join("data"))?;
+    for (name, csv) in report.findings.iter().flat_map(tables_csv) {
+        write_whole(&data.join(name), csv.as_bytes())?;
+    }
+    for (name, text) in [("report.md", markdown), ("report.html", page_html(report))] {
+        let path = out.join(name);
+        write_whole(&path, text.as_bytes())?;
+        writeln!(printed, "{}", path.display())?;
+    }
+    for verdict in Verdict::ALL {
+        let count = report
+            .findings
+            .iter()
+            .filter(|finding| finding.verdict == verdict)
+            .count();
+        writeln!(printed, "  {count:>3} {}", verdict.name())?;
+    }
     Ok(())
+}
+
+/// A folder, made where it is missing.
+fn folder(path: &Path) -> Result<PathBuf, Failure> {
+    std::fs::create_dir_all(path).map_err(|source| pilotage::Error::Io {
+        path: path.to_owned(),
+        source,
+    })?;
+    Ok(path.to_owned())
 }
 
 /// The experiments asked for, in the order of the thesis; all without a choice.
