@@ -35,7 +35,7 @@ const ABOUT: [About; 4] = [
         needs: "motion, sensor and noise of its own body, the outer bounds, and a world to try things in",
         gives: "an automaton of a handful of regions, with memory where the past matters",
         choose: "map and rewards are not known",
-        gap: ("figure-4.10", 0, 0, 3),
+        gap: ("figure-4.10", 0, 0, 4),
         of: "% of what one who is told earns in the 4x4 maze",
     },
     About {

@@ -141,7 +141,7 @@ struct Problem {
     thesis: &'static str,
     /// Vigilances to learn at; the drawings are of the first.
     vigilances: &'static [f64],
-    /// Share of the yardstick, in %, above which the learner has solved it.
+    /// Share of the yardstick, in %, from which on it counts as solved.
     solved: f64,
 }
 
@@ -151,11 +151,9 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
     let mut draft = Draft::new(one.title, one.thesis);
     let mut rows = Vec::new();
     let (mut highest, mut nodes) = (f64::NEG_INFINITY, Vec::new());
-    let vigilances: &[f64] = if context.quick {
-        &one.vigilances[..1]
-    } else {
-        one.vigilances
-    };
+    // A quick look is at the ends of the range.
+    let ends = [one.vigilances[0], one.vigilances[one.vigilances.len() - 1]];
+    let vigilances: &[f64] = if context.quick { &ends } else { one.vigilances };
     for &vigilance in vigilances {
         let found = runs(context, &model, &|seed| at(vigilance, seed))?;
         let of = |value: &dyn Fn(&Run) -> f64| -> Vec<f64> { found.iter().map(value).collect() };
@@ -208,7 +206,7 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
             ),
             (
                 Verdict::Contradicted,
-                format!("At the best of these vigilances {highest:.1}% of the yardstick is earned: remembering one cluster back does not reveal enough of what is hidden."),
+                format!("At the best of these vigilances {highest:.1}% of the yardstick is earned, short of the {}% that would count as solved.", one.solved),
             ),
         )))
 }
@@ -259,7 +257,7 @@ pub fn figure_3_13(context: &Context<'_>) -> Result<Finding, Failure> {
             model: "stations-5x5",
             title: "Figures 3.13 and 3.14: ARKAQ and the four stations",
             thesis: "It settles on one pair of stations, the first it found.",
-            vigilances: &[0.5],
+            vigilances: &[0.5, 0.8],
             solved: 85.0,
         },
     )

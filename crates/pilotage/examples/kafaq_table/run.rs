@@ -5,7 +5,7 @@ use std::time::Instant;
 use pilotage::belief::BeliefMdp;
 use pilotage::model::Model;
 use pilotage::observe::Silent;
-use pilotage::policy::{Automaton, Controller};
+use pilotage::policy::Controller;
 use pilotage::simulate::{Evaluation, LifeOptions, evaluate, life};
 use pilotage::solve::compile;
 use pilotage::solve::kafaq::{self, Learned, Settings};
@@ -41,7 +41,7 @@ impl Run {
             seed,
             earned: earned(model),
             on_robot: robot.map(earned),
-            components: closed_components(automaton),
+            components: automaton.closed_components(),
             learned,
             seconds,
         }
@@ -117,35 +117,4 @@ fn learn(model: &Model, seed: u64) -> (Learned, f64) {
     };
     let learned = kafaq::learn(model, &worlds, &settings, None, &Silent).unwrap();
     (learned, clock.elapsed().as_secs_f64())
-}
-
-/// Ways out of a node that fewer of its departures take do not count.
-const RARELY: f64 = 0.01;
-
-/// Parts of an automaton that are rarely left again: strongly connected components without a way out, by the steps that were seen.
-fn closed_components(automaton: &Automaton) -> usize {
-    let n = automaton.nodes.len();
-    let mut reaches: Vec<Vec<bool>> = (0..n)
-        .map(|from| (0..n).map(|to| from == to).collect())
-        .collect();
-    let mut departures = vec![0.0; n];
-    for &(from, count) in automaton.nodes.iter().flat_map(|node| &node.predecessors) {
-        departures[from] += count;
-    }
-    for (to, node) in automaton.nodes.iter().enumerate() {
-        for &(from, count) in &node.predecessors {
-            reaches[from][to] |= count >= RARELY * departures[from];
-        }
-    }
-    for middle in 0..n {
-        let onward = reaches[middle].clone();
-        for row in reaches.iter_mut().filter(|row| row[middle]) {
-            row.iter_mut().zip(&onward).for_each(|(to, on)| *to |= on);
-        }
-    }
-    let closed = |node: usize| (0..n).all(|to| !reaches[node][to] || reaches[to][node]);
-    let first = |node: usize| !(0..node).any(|other| reaches[node][other] && reaches[other][node]);
-    (0..n)
-        .filter(|&node| automaton.nodes[node].visits > 0.0 && closed(node) && first(node))
-        .count()
 }

@@ -2,6 +2,7 @@
 
 mod automaton;
 mod builder;
+mod components;
 mod controller;
 mod coordinates;
 mod store;
