@@ -1,13 +1,14 @@
 //! Chapter 3: the pole's parameters, and what ARKAQ learns.
 
 use nalgebra::{DMatrix, DVector};
+use pilotage::belief::BeliefMdp;
 use pilotage::model::{Model, WorldKind};
 use pilotage::observe::Silent;
 use pilotage::policy::Controller;
 use pilotage::report::{Finding, Verdict, returns_svg, values_svg};
 use pilotage::simulate::{Evaluation, LifeOptions, life};
-use pilotage::solve::Learning;
 use pilotage::solve::arkaq::{self, Learned};
+use pilotage::solve::{Learning, compile};
 use pilotage::world::{ProblemWorld, World};
 use rayon::prelude::*;
 
@@ -108,7 +109,14 @@ struct Run {
 
 fn learn(model: &Model, settings: arkaq::Settings) -> Result<Learned, Failure> {
     let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
-    Ok(arkaq::learn(model, &worlds, &settings, None, &Silent)?)
+    let mut learned = arkaq::learn(model, &worlds, &settings, None, &Silent)?;
+    compile::annotate(
+        &mut learned.automaton,
+        &BeliefMdp::new(model),
+        200,
+        settings.seed,
+    );
+    Ok(learned)
 }
 
 fn at(vigilance: f64, seed: u64) -> arkaq::Settings {
