@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use pilotage::model::{self, Model, WallBelief, Walls};
 use pilotage::policy::write_whole;
 use pilotage::report::{returns_svg, values_svg};
-use pilotage::simulate::Evaluation as Earned;
+use pilotage::simulate::{Estimate, Evaluation as Earned};
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
 use pilotage::solve::lqg::Weights;
 use pilotage::solve::{Form, Solution, SolveSettings, SolverKind, solve};
@@ -33,6 +33,9 @@ pub struct Arguments {
     /// Write the policy to this file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Measure what compiling the planner into an automaton cost, over the same episodes.
+    #[arg(long)]
+    value_lost: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -234,25 +237,56 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let clock = Instant::now();
     let earned = solution.evaluate(&model, arguments.evaluation.options(), &bars);
     let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
+    let lost = arguments
+        .value_lost
+        .then(|| value_lost(arguments, solver, &model, &settings, &solution, &bars))
+        .transpose()?;
 
     let mut out = std::io::stdout().lock();
     if arguments.json {
-        writeln!(
-            out,
-            "{}",
-            report(arguments, &model, solver, &solution, &earned, seconds)
-        )?;
+        let mut report = report(arguments, &model, solver, &solution, &earned, seconds);
+        if let Some(lost) = lost {
+            report["value_lost"] = json!(lost);
+        }
+        writeln!(out, "{report}")?;
     } else {
         write!(
             out,
             "{}",
             shown(arguments, &model, solver, &solution, &earned, seconds)
         )?;
+        if let Some(lost) = lost {
+            writeln!(
+                out,
+                "  lost in compiling    {} (the planner's return less the automaton's, same episodes)",
+                summary::estimate(&lost)
+            )?;
+        }
         for file in curves {
             writeln!(out, "  {}", file.display())?;
         }
     }
     Ok(())
+}
+
+/// Solves again without compiling, and compares.
+fn value_lost(
+    arguments: &Arguments,
+    solver: SolverKind,
+    model: &Model,
+    settings: &SolveSettings,
+    solution: &Solution,
+    bars: &Bars,
+) -> Result<Estimate, Failure> {
+    let uncompiled = SolveSettings {
+        form: Form::Grid,
+        ..settings.clone()
+    };
+    let planner = solve(solver, model, &uncompiled, bars)?;
+    let options = arguments.evaluation.options();
+    solution
+        .value_lost(&planner, model, options, bars)
+        .ok_or_else(|| Failure::Usage("--value-lost compares an automaton with the planner it was compiled from; choose --policy nearest or segments".to_owned()))
 }
 
 fn report(

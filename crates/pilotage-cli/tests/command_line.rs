@@ -100,6 +100,29 @@ fn a_saved_policy_earns_what_it_earned_when_it_was_found() {
 }
 
 #[test]
+fn compiling_the_corridor_loses_nothing() {
+    let text = printed(&[
+        "solve",
+        "corridor-declare",
+        "--episodes",
+        "4000",
+        "--value-lost",
+        "--json",
+    ]);
+    let report: Value = serde_json::from_str(&text).unwrap();
+    let (lost, error) = (
+        &report["value_lost"]["mean"],
+        &report["value_lost"]["stderr"],
+    );
+    // Paired: most episodes are the same. Three standard errors: one seed in 370 would fail by chance.
+    assert!(error.as_f64().unwrap() < 0.05, "{text}");
+    assert!(
+        lost.as_f64().unwrap() <= 3.0 * error.as_f64().unwrap(),
+        "{text}"
+    );
+}
+
+#[test]
 fn drawing_writes_an_automaton_and_a_map() {
     let folder = tempfile::tempdir().unwrap();
     let policy = folder.path().join("p.json");
@@ -137,7 +160,7 @@ fn output_that_people_read_stays_as_it_is() {
 
 #[test]
 fn every_verb_explains_itself() {
-    for verb in ["list", "check", "solve", "simulate", "draw"] {
+    for verb in ["list", "check", "solve", "simulate", "draw", "reproduce"] {
         assert!(
             printed(&[verb, "--help"]).contains("Usage: pilotage"),
             "{verb}"

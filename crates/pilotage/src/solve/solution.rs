@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::model::{Model, suggest};
 use crate::observe::Observer;
 use crate::policy::{Automaton, Controller, Matching, Policy};
-use crate::simulate::{Evaluation, Options, evaluate};
+use crate::simulate::{Difference, Evaluation, Options, compare, evaluate};
 
 /// Form of the policy a planner hands over. Learners hand over the form they learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -116,6 +116,23 @@ impl Solution {
             Solved::Automaton(automaton) => Some(automaton),
             Solved::Control(_) | Solved::Rule { .. } => None,
         }
+    }
+
+    /// What compiling cost: the discounted return of the planner itself, solved as [`Form::Grid`], less that of this automaton of
+    /// it, over the same episodes. `None` where this is no automaton, or the other no rule.
+    pub fn value_lost(
+        &self,
+        planner: &Self,
+        model: &Model,
+        options: Options,
+        observer: &dyn Observer,
+    ) -> Option<Difference> {
+        let Solved::Rule { policy, filter } = &planner.policy else {
+            return None;
+        };
+        let compiled = Controller::new(self.automaton()?);
+        let (planner, compiled): (&dyn Policy, &dyn Policy) = (policy.as_ref(), &compiled);
+        Some(compare(model, filter, planner, compiled, options, observer))
     }
 
     /// Runs the policy in the model's world, by the standard of [`crate::simulate`].

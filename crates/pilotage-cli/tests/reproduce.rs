@@ -1,0 +1,125 @@
+//! `pilotage reproduce`: what it writes, that it goes on where it stopped, that a seed gives the same report.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use assert_cmd::cargo::cargo_bin_cmd;
+
+fn reproduce(out: &Path, only: &str, seed: &str) -> Command {
+    let mut command = cargo_bin_cmd!("pilotage");
+    command.args([
+        "reproduce",
+        "--quick",
+        "--only",
+        only,
+        "--seed",
+        seed,
+        "--out",
+    ]);
+    command.arg(out);
+    command
+}
+
+/// Few and fast ones, exact and simulated.
+const SOME: &str = "table-4.1,figure-5.4,figure-4.8";
+
+#[test]
+fn a_report_is_a_page_markdown_figures_and_data() {
+    let folder = tempfile::tempdir().unwrap();
+    reproduce(folder.path(), SOME, "1").assert().success();
+    let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("Table 4.1") && page.contains("Figures 5.3 and 5.4"));
+    let markdown = fs::read_to_string(folder.path().join("report.md")).unwrap();
+    for figure in markdown.split("](figures/").skip(1) {
+        let (name, _) = figure.split_once(')').unwrap();
+        assert!(folder.path().join("figures").join(name).exists(), "{name}");
+    }
+    let table = fs::read_to_string(folder.path().join("data/table-4.1.csv")).unwrap();
+    assert_eq!(
+        table
+            .lines()
+            .map(|line| line.rsplit(',').next().unwrap())
+            .collect::<Vec<_>>(),
+        ["here", "9", "9", "9", "8", "7"]
+    );
+}
+
+#[test]
+fn a_seed_gives_the_same_report_with_one_thread_and_with_many() {
+    let texts: Vec<String> = [("1", "1"), ("1", "4"), ("2", "4")]
+        .iter()
+        .map(|(seed, threads)| {
+            let folder = tempfile::tempdir().unwrap();
+            reproduce(folder.path(), SOME, seed)
+                .args(["--threads", threads])
+                .assert()
+                .success();
+            fs::read_to_string(folder.path().join("report.html")).unwrap()
+        })
+        .collect();
+    assert_eq!(texts[0], texts[1]);
+    assert_ne!(texts[0], texts[2]);
+}
+
+#[test]
+fn what_is_there_is_not_made_again_unless_it_is_of_another_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let kept = folder.path().join("data/table-4.1.json");
+    reproduce(folder.path(), "table-4.1", "1")
+        .assert()
+        .success();
+    let marked = fs::read_to_string(&kept)
+        .unwrap()
+        .replace("Table 4.1", "Kept");
+    fs::write(&kept, &marked).unwrap();
+    let title = || {
+        fs::read_to_string(folder.path().join("report.md"))
+            .unwrap()
+            .contains("Kept")
+    };
+
+    reproduce(folder.path(), "table-4.1", "1")
+        .assert()
+        .success();
+    assert!(title(), "made again");
+    reproduce(folder.path(), "table-4.1", "2")
+        .assert()
+        .success();
+    assert!(!title(), "taken from another seed");
+
+    // Damage is no reason to stop.
+    fs::write(&kept, &marked[..marked.len() / 2]).unwrap();
+    reproduce(folder.path(), "table-4.1", "1")
+        .assert()
+        .success();
+    assert!(!title());
+}
+
+#[test]
+fn a_name_that_is_none_brings_the_nearest() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = reproduce(folder.path(), "tabel-4.1", "1")
+        .assert()
+        .failure()
+        .get_output()
+        .clone();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("did you mean `table-4.1`?"), "{message}");
+    assert!(!folder.path().join("report.html").exists());
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_one_message() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    fs::write(&file, "").unwrap();
+    let output = reproduce(&file.join("report"), "table-4.1", "1")
+        .assert()
+        .failure()
+        .get_output()
+        .clone();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(message.matches("error:").count(), 1, "{message}");
+}
