@@ -12,14 +12,13 @@
 use std::time::Instant;
 
 use pilotage::belief::BeliefMdp;
-use pilotage::model::{Model, find};
+use pilotage::model::find;
 use pilotage::observe::{Observer, Silent};
 use pilotage::policy::{Controller, Policy};
 use pilotage::simulate::{LifeOptions, life};
-use pilotage::solve::hazard::{Runs, Sample};
 use pilotage::solve::kbvi::branches::{self, Branches};
 use pilotage::solve::kbvi::quadratic;
-use pilotage::solve::lqg::{NearestAction, Weights};
+use pilotage::solve::lqg::tuned;
 
 struct Notes;
 
@@ -27,56 +26,6 @@ impl Observer for Notes {
     fn note(&self, message: &str) {
         eprintln!("{message}");
     }
-}
-
-/// Full force in the direction of the linear-quadratic-Gaussian controller's command, undiscounted.
-fn bang_bang(mdp: &BeliefMdp, weights: [f64; 3]) -> pilotage::Result<Controller> {
-    let [position, angle, control] = weights;
-    let weights = Weights {
-        state: Some(vec![position, 0.0, angle, 0.0]),
-        control: Some(vec![control]),
-    };
-    let undiscounted = Model {
-        discount: 1.0,
-        ..mdp.model().clone()
-    };
-    let automaton = NearestAction::new(&undiscounted, &weights)?.automaton(mdp);
-    Ok(Controller::new(
-        &automaton.expect("the pole has two actions"),
-    ))
-}
-
-/// The weights under which the agent's own model expects the longest life from start to failure: the best of a coarse comparison
-/// of all, and of a finer one of the eight that did best.
-fn tuned(mdp: &BeliefMdp) -> pilotage::Result<(Controller, [f64; 3])> {
-    // Of failures as rare as with little noise no sample tells; with closer limits there are enough.
-    let steady = mdp.levels().covariance(mdp.levels().len() - 1);
-    let limits = if steady[(2, 2)] < 5e-4 { 0.75 } else { 1.0 };
-    let runs = Runs::from_start(mdp).with_limits(limits);
-    let hazard = |policy: &Controller, count| {
-        let sample = Sample {
-            runs: count,
-            steps: 10_000,
-            seed: 7,
-        };
-        runs.hazard(policy, sample)
-    };
-    let mut tried = Vec::new();
-    for position in [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 1.0] {
-        for control in [1e-6, 1e-5, 1e-4, 1e-3, 1e-2] {
-            let weights = [position, 1.0, control];
-            let policy = bang_bang(mdp, weights)?;
-            tried.push((hazard(&policy, 50), policy, weights));
-        }
-    }
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    tried.truncate(8);
-    for (measured, policy, _) in &mut tried {
-        *measured = hazard(policy, 400);
-    }
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (_, policy, weights) = tried.swap_remove(0);
-    Ok((policy, weights))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -94,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let clock = Instant::now();
     let automaton = quadratic::solve(&mdp, &quadratic::Settings::default(), &Notes)?;
     let planning = clock.elapsed().as_secs_f64();
-    let (lqg, [position, angle, control]) = tuned(&mdp)?;
+    let (lqg, [position, angle, control]) = tuned(&mdp, 1.0)?;
 
     println!(
         "pilotage {}, {name}, seed {}, {} runs of {} steps, planned in {planning:.0} s",

@@ -15,7 +15,7 @@ use pilotage::solve::kbvi::formulas::{
     Formulas, Outlook, RewardFormula, SpreadFormula, ramp_lines,
 };
 use pilotage::solve::kbvi::{closed, generate, quadratic};
-use pilotage::solve::lqg::{NearestAction, Weights};
+use pilotage::solve::lqg::tuned;
 use pilotage::solve::{Form, SolveSettings, SolverKind};
 
 use super::context::{Context, Draft, automaton, judge, or_dash, problem, shown};
@@ -507,15 +507,7 @@ pub fn section_5_5_5(context: &Context<'_>) -> Result<Finding, Failure> {
         };
         let found = quadratic::solve(&mdp, &settings, context.observer)?;
         let filter = found.filter.clone();
-        let undiscounted = Model {
-            discount: 1.0,
-            ..model.clone()
-        };
-        let weights = Weights {
-            state: Some(vec![0.01, 0.0, 1.0, 0.0]),
-            control: Some(vec![1e-4]),
-        };
-        let regulator = NearestAction::new(&undiscounted, &weights)?;
+        let (regulator, _) = tuned(&mdp, context.either(1.0, 0.02))?;
         let open_loop = |horizon, group| {
             let settings = branches::Settings {
                 horizon,
@@ -527,7 +519,7 @@ pub fn section_5_5_5(context: &Context<'_>) -> Result<Finding, Failure> {
         let (planned, long, short) = (Controller::new(&found), open_loop(180, 20), open_loop(6, 1));
         let policies: [(&str, &dyn Policy, u64); 4] = [
             ("kbvi-closed, automaton", &planned, steps),
-            ("lqg, bang-bang", &regulator, steps),
+            ("lqg, bang-bang, its weights tuned", &regulator, steps),
             (
                 "kbvi, open loop, horizon 180 by twenties",
                 &long,
