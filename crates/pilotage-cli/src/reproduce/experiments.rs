@@ -3,7 +3,7 @@
 use pilotage::report::Finding;
 
 use super::context::Context;
-use super::{chapter3, chapter4, chapter5, chapter6, learning};
+use super::{chapter3, chapter4, chapter5, chapter6, learning, pole, wake_up};
 use crate::failure::Failure;
 
 /// A table or figure, and how to make it again.
@@ -55,9 +55,9 @@ pub const EXPERIMENTS: &[Experiment] = &[
     of("convergence", "policy convergence horizons", (20.0, 3.0), chapter5::convergence),
     of("section-5.5.3", "the two-dimensional maze", (20.0, 0.5), chapter5::section_5_5_3),
     of("figure-5.14", "the hidden load (and 2.10, 2.11)", (0.5, 0.3), chapter5::figure_5_14),
-    of("section-5.5.5", "the inverted pendulum", (120.0, 4.0), chapter5::section_5_5_5),
-    of("table-5.1", "policy of the U-shaped maze", (1.0, 1.0), chapter5::table_5_1),
-    of("figure-5.17", "waking up lost (and 5.16)", (40.0, 2.5), chapter5::figures_5_16_and_5_17),
+    of("section-5.5.5", "the inverted pendulum", (120.0, 4.0), pole::section_5_5_5),
+    of("table-5.1", "policy of the U-shaped maze", (1.0, 1.0), wake_up::table_5_1),
+    of("figure-5.17", "waking up lost (and 5.16)", (40.0, 2.5), wake_up::figures_5_16_and_5_17),
     of("declare", "a maze in which looking pays", (5.0, 1.0), chapter5::declare),
     of("table-6.1", "segments and nearest neighbours", (30.0, 4.0), chapter6::table_6_1),
     of("figure-6.2", "ARKAQ and KAFAQ compared", (150.0, 2.0), chapter3::figure_6_2),

@@ -8,6 +8,8 @@ mod chapter6;
 mod context;
 mod experiments;
 mod learning;
+mod pole;
+mod wake_up;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
