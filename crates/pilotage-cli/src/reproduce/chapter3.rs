@@ -5,7 +5,7 @@ use pilotage::belief::BeliefMdp;
 use pilotage::model::{Model, WorldKind};
 use pilotage::observe::Silent;
 use pilotage::policy::Controller;
-use pilotage::report::{Finding, Verdict, returns_svg, values_svg};
+use pilotage::report::{Finding, Series, Verdict, returns_svg, values_svg};
 use pilotage::simulate::{Evaluation, LifeOptions, life};
 use pilotage::solve::arkaq::{self, Learned};
 use pilotage::solve::{Learning, compile};
@@ -158,7 +158,8 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
     let best = yardstick(context, &model)?;
     let mut draft = Draft::new(one.title, one.thesis);
     let mut rows = Vec::new();
-    let (mut highest, mut nodes) = (f64::NEG_INFINITY, Vec::new());
+    let mut highest = f64::NEG_INFINITY;
+    let (mut nodes, mut earnings) = (Vec::new(), Vec::new());
     // A quick look is at the ends of the range.
     let ends = [one.vigilances[0], one.vigilances[one.vigilances.len() - 1]];
     let vigilances: &[f64] = if context.quick { &ends } else { one.vigilances };
@@ -167,8 +168,9 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
         let of = |value: &dyn Fn(&Run) -> f64| -> Vec<f64> { found.iter().map(value).collect() };
         let shares = of(&|run| 100.0 * run.earned.discounted.mean / best.discounted.mean);
         highest = highest.max(median_of(shares.clone()));
+        earnings.push((vigilance, median_of(shares.clone())));
         let clusters = of(&|run| run.learned.automaton.nodes.len() as f64);
-        nodes.push(median_of(clusters.clone()));
+        nodes.push((vigilance, median_of(clusters.clone())));
         let count = |which: &dyn Fn(&Run) -> bool| {
             format!(
                 "{} of {}",
@@ -199,7 +201,25 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
                 );
         }
     }
-    let growing = nodes.windows(2).all(|pair| pair[0] <= pair[1]);
+    let growing = nodes.windows(2).all(|pair| pair[0].1 <= pair[1].1);
+    let by_vigilance = |name: &str, points: Vec<(f64, f64)>| {
+        [Series {
+            name: name.to_owned(),
+            points,
+            band: None,
+        }]
+    };
+    let draft = draft
+        .curves(
+            "Clusters by vigilance",
+            ("vigilance", "clusters"),
+            &by_vigilance("clusters", nodes),
+        )?
+        .curves(
+            "Return by vigilance",
+            ("vigilance", "% of the yardstick"),
+            &by_vigilance("return", earnings),
+        )?;
     Ok(draft
         .table(
             format!("ARKAQ over {} seeds: median (least to greatest); the yardstick, closed-loop KBVI, earns {}", seeds(context).len(), shown(best.discounted)),
@@ -226,7 +246,7 @@ pub fn figure_3_4(context: &Context<'_>) -> Result<Finding, Failure> {
             model: "basic",
             title: "Figures 3.4, 3.5 and 3.6: ARKAQ in the basic world",
             thesis: "Two states at vigilance 0.1 and four at 0.9, the goal always apart; Q-values converge without swinging.",
-            vigilances: &[0.1, 0.5, 0.9],
+            vigilances: &[0.1, 0.3, 0.5, 0.7, 0.9],
             solved: 97.0,
         },
     )
@@ -239,7 +259,7 @@ pub fn figure_3_8(context: &Context<'_>) -> Result<Finding, Failure> {
             model: "maze-4x4",
             title: "Figures 3.8, 3.9 and 3.10: ARKAQ in the 4x4 maze",
             thesis: "At vigilance 0.1 some states have no clear action; at 0.9 fewer.",
-            vigilances: &[0.1, 0.5, 0.9],
+            vigilances: &[0.1, 0.3, 0.5, 0.7, 0.9],
             solved: 95.0,
         },
     )
