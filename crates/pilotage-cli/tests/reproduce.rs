@@ -32,8 +32,13 @@ fn a_report_is_a_page_markdown_figures_and_data() {
     let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
     assert!(page.contains("Table 4.1") && page.contains("Figures 5.3 and 5.4"));
     let markdown = fs::read_to_string(folder.path().join("report.md")).unwrap();
-    for figure in markdown.split("](figures/").skip(1) {
-        let (name, _) = figure.split_once(')').unwrap();
+    let named: Vec<&str> = markdown
+        .split("](<figures/")
+        .skip(1)
+        .filter_map(|rest| Some(rest.split_once(">)")?.0))
+        .collect();
+    assert!(named.len() >= 3, "{named:?}");
+    for name in named {
         assert!(folder.path().join("figures").join(name).exists(), "{name}");
     }
     let table = fs::read_to_string(folder.path().join("data/table-4.1.csv")).unwrap();
