@@ -5,7 +5,7 @@ use divan::{Bencher, counter::ItemsCount};
 use pilotage::belief::BeliefMdp;
 use pilotage::model::{self, Model};
 use pilotage::observe::Silent;
-use pilotage::policy::{Controller, Policy};
+use pilotage::policy::{Automaton, Controller, Policy};
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::kbvi::closed;
@@ -21,13 +21,7 @@ const EPISODES: usize = 10_000;
 fn whole() -> Evaluation {
     let corridor = read();
     let policy = plan(&BeliefMdp::new(&corridor));
-    let automaton = compile(
-        &policy,
-        policy.mdp(),
-        "kbvi-closed",
-        &compile::Settings::default(),
-    );
-    simulate(&corridor, &Controller::new(&automaton.unwrap()))
+    simulate(&corridor, &Controller::new(&compiled(&policy)))
 }
 
 #[divan::bench]
@@ -44,14 +38,7 @@ fn plan_only(bencher: Bencher) {
 #[divan::bench(sample_count = 10)]
 fn compile_only(bencher: Bencher) {
     let policy = plan(&BeliefMdp::new(&read()));
-    bencher.bench(|| {
-        compile(
-            &policy,
-            policy.mdp(),
-            "kbvi-closed",
-            &compile::Settings::default(),
-        )
-    });
+    bencher.bench(|| compiled(&policy));
 }
 
 /// Episodes of sixty steps.
@@ -59,13 +46,7 @@ fn compile_only(bencher: Bencher) {
 fn episodes_of_the_automaton(bencher: Bencher) {
     let corridor = read();
     let policy = plan(&BeliefMdp::new(&corridor));
-    let automaton = compile(
-        &policy,
-        policy.mdp(),
-        "kbvi-closed",
-        &compile::Settings::default(),
-    );
-    let controller = Controller::new(&automaton.unwrap());
+    let controller = Controller::new(&compiled(&policy));
     bencher
         .counter(ItemsCount::new(EPISODES))
         .bench(|| simulate(&corridor, &controller));
@@ -82,6 +63,11 @@ fn episodes_of_the_grid(bencher: Bencher) {
 
 fn plan(mdp: &BeliefMdp) -> closed::GridPolicy {
     closed::solve(mdp, &closed::Settings::default(), &Silent).unwrap()
+}
+
+fn compiled(policy: &closed::GridPolicy) -> Automaton {
+    let settings = compile::Settings::default();
+    compile(policy, policy.mdp(), "kbvi-closed", &settings).unwrap()
 }
 
 fn simulate(model: &Model, policy: &dyn Policy) -> Evaluation {

@@ -1,4 +1,4 @@
-//! Every solver on the problems of one and two dimensions, as Markdown tables: `cargo run --release --example results > docs/results.md`.
+//! Every planner on the problems of one and two dimensions, as Markdown tables: `cargo run --release --example results > docs/results.md`.
 #![allow(clippy::print_stdout)]
 
 use pilotage::model::{self, Model};
@@ -35,7 +35,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "| solver | formulas | policy | nodes | horizon | planned | discounted | undiscounted | steps |"
         );
         println!("|---|---|---|--:|--:|--:|--:|--:|--:|");
-        for solver in SolverKind::ALL {
+        for solver in SolverKind::ALL
+            .into_iter()
+            .filter(|solver| !solver.learns())
+        {
             for (label, formulas) in formula_sets(solver) {
                 for form in Form::ALL {
                     let Some(evaluation) = row(&model, solver, label, formulas, form)? else {
