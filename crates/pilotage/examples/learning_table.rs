@@ -18,6 +18,7 @@ use pilotage::simulate::{Estimate, Evaluation, Options, evaluate};
 use pilotage::solve::kbvi::closed;
 use pilotage::solve::{Form, SolveSettings, SolverKind, arkaq, kafaq, solve, yardstick};
 use pilotage::world::{ProblemWorld, World};
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
 const PROBLEMS: [&str; 6] = [
@@ -35,7 +36,7 @@ const EVALUATION: Options = Options {
     seed: 999,
 };
 
-const VIGILANCES: [f64; 7] = [0.1, 0.3, 0.5, 0.6, 0.7, 0.8, 0.9];
+const VIGILANCES: [f64; 6] = [0.1, 0.3, 0.5, 0.7, 0.8, 0.9];
 
 /// The best vigilance is the lowest that comes so near to the highest share, in %.
 const CLOSE: f64 = 0.5;
@@ -46,9 +47,9 @@ fn main() {
     let seeds: u64 = arguments.get(1).map_or(20, |text| text.parse().unwrap());
     let folder = arguments.get(2).map_or(".", String::as_str);
     println!(
-        "| problem | learner | nodes | steps of experience | share of the yardstick, % | converged | capped |"
+        "| problem | learner | clusters | nodes | steps of experience | share of the yardstick, % | converged | capped |"
     );
-    println!("|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|");
     for name in PROBLEMS
         .into_iter()
         .filter(|name| which == "all" || which == *name)
@@ -71,9 +72,19 @@ struct Run {
     earned: Evaluation,
     samples: u64,
     converged: bool,
-    /// Of ARKAQ: vigilance, clusters before merging, whether there were too many, whether rewarded ones were apart.
-    network: Option<(f64, usize, bool, bool)>,
+    /// Of ARKAQ.
+    network: Option<Network>,
     seconds: f64,
+}
+
+struct Network {
+    vigilance: f64,
+    clusters: usize,
+    /// Before merging.
+    states: usize,
+    capped: bool,
+    /// Whether no cluster mixes rewarded beliefs with others.
+    goal_apart: bool,
 }
 
 struct Table {
@@ -90,7 +101,7 @@ impl Table {
             rows: Vec::new(),
         };
         println!(
-            "| {} | {} | {} | | {:.2} ± {:.2} = 100 | | |",
+            "| {} | {} | | {} | | {:.2} ± {:.2} = 100 | | |",
             table.problem,
             table.yardstick.0,
             table
@@ -101,93 +112,114 @@ impl Table {
             table.yardstick.1.discounted.stderr,
         );
         let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
-        let learned: Result<Vec<Run>, _> = (1..=seeds)
-            .map(|seed| run_kafaq(model, &worlds, seed))
-            .collect();
+        let all = || (1..=seeds).into_par_iter();
+        let learned: Result<Vec<Run>, _> =
+            all().map(|seed| run_kafaq(model, &worlds, seed)).collect();
         match learned {
             Ok(runs) => {
                 table.add("KAFAQ".to_owned(), runs);
             }
             Err(error) => println!("| {} | KAFAQ | {error} |", table.problem),
         }
-        let mut add = |learner: String, settings: &arkaq::Settings| {
-            let runs = (1..=seeds).map(|seed| run_arkaq(model, &worlds, settings, seed));
-            table.add(learner, runs.collect())
+        let mut add = |learner: &str, settings: &arkaq::Settings| {
+            let runs = all().map(|seed| run_arkaq(model, &worlds, settings, seed));
+            table.add(format!("ARKAQ, {learner}"), runs.collect())
         };
-        let plain = |vigilance: f64| arkaq::Settings {
-            vigilances: vec![vigilance],
-            ..arkaq::Settings::default()
-        };
-        let shares = VIGILANCES.map(|vigilance| {
-            let learner = format!("ARKAQ, vigilance {vigilance}");
-            (vigilance, add(learner, &plain(vigilance)))
-        });
-        let most = shares.iter().map(|share| share.1).fold(0.0, f64::max);
-        let best = shares
-            .iter()
-            .find(|share| share.1 >= most - CLOSE)
-            .unwrap()
-            .0;
         let extended = arkaq::Settings::extended();
+        let plain = arkaq::Settings::default();
+        let deep = arkaq::Settings {
+            lambda: extended.lambda,
+            depth: extended.depth,
+            state_limit: extended.state_limit,
+            ..plain.clone()
+        };
+        let at = |settings: &arkaq::Settings, vigilance: f64| arkaq::Settings {
+            vigilances: vec![vigilance],
+            ..settings.clone()
+        };
+        let mut best = |what: &str, settings: &arkaq::Settings| {
+            let shares = VIGILANCES.map(|vigilance| {
+                let learner = format!("{what}vigilance {vigilance}");
+                (vigilance, add(&learner, &at(settings, vigilance)))
+            });
+            let most = shares.iter().map(|share| share.1).fold(0.0, f64::max);
+            let found = shares.iter().find(|share| share.1 >= most - CLOSE);
+            found.unwrap().0
+        };
+        let plainly = best("", &plain);
+        let deeply = best("Q(lambda), longer memory, ", &deep);
         let additions = [
             (
                 "Q(lambda)",
                 arkaq::Settings {
                     lambda: extended.lambda,
-                    ..plain(best)
+                    ..at(&plain, plainly)
                 },
             ),
             (
                 "longer memory",
                 arkaq::Settings {
-                    before: extended.before,
-                    past: extended.past,
-                    action: extended.action,
-                    ..plain(best)
+                    depth: extended.depth,
+                    state_limit: extended.state_limit,
+                    ..at(&plain, plainly)
                 },
             ),
             (
                 "merging",
                 arkaq::Settings {
                     merge: true,
-                    ..plain(best)
+                    ..at(&plain, plainly)
                 },
             ),
             (
                 "without memory",
                 arkaq::Settings {
-                    before: 0.0,
-                    action: 0.0,
-                    ..plain(best)
+                    depth: 0,
+                    ..at(&plain, plainly)
                 },
             ),
         ];
         for (what, settings) in additions {
-            add(format!("ARKAQ, vigilance {best}, {what}"), &settings);
+            add(&format!("vigilance {plainly}, {what}"), &settings);
         }
+        let merged = arkaq::Settings {
+            merge: true,
+            ..at(&deep, deeply)
+        };
+        add(
+            &format!("Q(lambda), longer memory, vigilance {deeply}, merging"),
+            &merged,
+        );
         let tuned = arkaq::Settings {
             vigilances: extended.vigilances.clone(),
-            ..arkaq::Settings::default()
+            ..plain
         };
-        add("ARKAQ, tuned vigilance".to_owned(), &tuned);
-        add("ARKAQ, all additions".to_owned(), &extended);
+        add("tuned vigilance", &tuned);
+        add("all additions", &extended);
         table
     }
 
     /// Prints and keeps a row; returns its median share of the yardstick.
     fn add(&mut self, learner: String, runs: Vec<Run>) -> f64 {
         let best = self.yardstick.1.discounted.mean;
+        let clusters = |run: &Run| run.network.as_ref().map_or(0.0, |one| one.clusters as f64);
+        let clusters = if runs.iter().any(|run| run.network.is_some()) {
+            show(spread(&runs, clusters), 0)
+        } else {
+            String::new()
+        };
         let share = spread(&runs, |run| 100.0 * run.earned.discounted.mean / best);
         println!(
-            "| {} | {learner} | {} | {} | {} | {} of {} | {} |",
+            "| {} | {learner} | {} | {} | {} | {} | {} of {} | {} |",
             self.problem,
+            clusters,
             show(spread(&runs, |run| run.automaton.nodes.len() as f64), 0),
             show(spread(&runs, |run| run.samples as f64), 0),
             show(share, 1),
             runs.iter().filter(|run| run.converged).count(),
             runs.len(),
             runs.iter()
-                .filter(|run| run.network.is_some_and(|network| network.2))
+                .filter(|run| run.network.as_ref().is_some_and(|network| network.capped))
                 .count(),
         );
         self.rows.push(Row { learner, runs });
@@ -213,8 +245,14 @@ impl Table {
 
 impl Run {
     fn json(&self) -> Value {
-        let network = self.network.map(|(vigilance, clusters, capped, apart)| {
-            json!({ "vigilance": vigilance, "clusters": clusters, "capped": capped, "goal_apart": apart })
+        let network = self.network.as_ref().map(|network| {
+            json!({
+                "vigilance": network.vigilance,
+                "clusters": network.clusters,
+                "states": network.states,
+                "capped": network.capped,
+                "goal_apart": network.goal_apart,
+            })
         });
         json!({
             "seed": self.seed,
@@ -258,7 +296,6 @@ fn run_arkaq(
         ..settings.clone()
     };
     let learned = arkaq::learn(model, worlds, &settings, None, &Silent).unwrap();
-    // No cluster mixes rewarded beliefs with others.
     let rewarded = || {
         learned
             .learning
@@ -266,19 +303,20 @@ fn run_arkaq(
             .iter()
             .map(|cluster| cluster.rewarded)
     };
-    let apart = rewarded().all(|x| x == 0.0 || x == 1.0) && rewarded().any(|x| x == 1.0);
+    let goal_apart = rewarded().all(|x| x == 0.0 || x == 1.0) && rewarded().any(|x| x == 1.0);
     Run {
         seed,
         seconds: clock.elapsed().as_secs_f64(),
         earned: earned(model, &learned.automaton),
         samples: learned.samples,
         converged: learned.converged,
-        network: Some((
-            learned.learning.vigilance,
-            learned.learning.clusters.len(),
-            learned.learning.capped,
-            apart,
-        )),
+        network: Some(Network {
+            vigilance: learned.learning.vigilance,
+            clusters: learned.learning.clusters.len(),
+            states: learned.learning.states,
+            capped: learned.learning.capped,
+            goal_apart,
+        }),
         automaton: learned.automaton,
     }
 }

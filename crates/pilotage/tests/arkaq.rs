@@ -7,10 +7,11 @@ use pilotage::Error;
 use pilotage::belief::BeliefMdp;
 use pilotage::model::{self, Interval, Model};
 use pilotage::observe::{Observer, Silent};
-use pilotage::policy::{Automaton, Controller};
+use pilotage::policy::{Automaton, Controller, Node, Place};
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::arkaq::{self, Learned, Run, Settings};
 use pilotage::solve::kbvi::closed;
+use pilotage::solve::yardstick::yardsticks;
 use pilotage::world::{ProblemWorld, World};
 
 const OPTIONS: Options = Options {
@@ -74,7 +75,7 @@ fn the_hallway_has_few_clusters_at_low_vigilance_and_more_at_high_and_the_goal_i
     let model = model("basic");
     let best = planned(&model).discounted.mean;
     let mut clusters = 0;
-    for (vigilance, most) in [(0.1, 4), (0.5, 30), (0.9, 200)] {
+    for (vigilance, most) in [(0.1, 3), (0.5, 6), (0.9, 30)] {
         let learned = learn(&model, &at(vigilance));
         let found = learned.learning.clusters.len();
         assert!(
@@ -97,35 +98,35 @@ fn the_hallway_has_few_clusters_at_low_vigilance_and_more_at_high_and_the_goal_i
         );
         // The goal is the cell at the right end; a belief lags behind, so that not all of its clusters need lie there.
         let middle = |share: f64| {
-            let places: Vec<f64> = rewarded(share).map(|c| c.centre.now.place[0]).collect();
+            let places: Vec<f64> = rewarded(share).map(|c| c.centre[0]).collect();
             places.iter().sum::<f64>() / places.len() as f64
         };
-        assert!(middle(1.0) > 0.6 && middle(0.0) < 0.6);
+        assert!(middle(1.0) > 2.4 && middle(0.0) < 2.4);
         let earned = earned(&model, &learned.automaton).discounted.mean;
         assert!(earned >= 0.97 * best, "{earned} of {best} at {vigilance}");
     }
 }
 
 #[test]
-fn a_hidden_load_becomes_clusters_at_the_same_place_with_opposite_actions() {
+fn a_hidden_load_becomes_states_in_the_same_cluster_with_opposite_actions() {
     let model = model("cart-load-unload");
     let learned = learn(&model, &at(0.7));
     let best = planned(&model).discounted.mean;
     let earned = earned(&model, &learned.automaton).discounted.mean;
     assert!(earned >= 0.85 * best, "{earned} of {best}");
-    let recall = learned.automaton.filter.recall().unwrap();
-    let nodes = recall.clusters().iter().zip(&learned.automaton.nodes);
-    let nodes: Vec<_> = nodes.map(|(c, n)| (c.now.place[0], n.action)).collect();
-    let opposite = |a: &(f64, usize)| {
+    // In the middle, a node that goes east and one that goes west.
+    let inside =
+        |node: &&Node| matches!(&node.place, Place::Point(x) if (1.2..2.8).contains(&x[0]));
+    let nodes: Vec<&Node> = learned.automaton.nodes.iter().filter(inside).collect();
+    let opposite = nodes.iter().any(|a| {
         nodes
             .iter()
-            .any(|b| (a.0 - b.0).abs() < 0.05 && a.1 != b.1 && (0.3..0.7).contains(&b.0))
-    };
-    assert!(nodes.iter().any(opposite), "{nodes:?}");
+            .any(|b| a.place == b.place && a.action != b.action)
+    });
+    assert!(opposite, "{nodes:?}");
     // One that forgets cannot tell.
     let forgetful = Settings {
-        before: 0.0,
-        action: 0.0,
+        depth: 0,
         ..at(0.7)
     };
     let without = self::earned(&model, &learn(&model, &forgetful).automaton)
@@ -154,7 +155,7 @@ fn merging_leaves_fewer_nodes_and_loses_nothing() {
 }
 
 #[test]
-fn too_many_clusters_end_exploration_with_a_clear_statement() {
+fn too_many_states_end_exploration_with_a_clear_statement() {
     struct Notes(Mutex<Vec<String>>);
     impl Observer for Notes {
         fn note(&self, message: &str) {
@@ -163,7 +164,7 @@ fn too_many_clusters_end_exploration_with_a_clear_statement() {
     }
     let model = model("cart-pole-sd");
     let settings = Settings {
-        cluster_limit: 40,
+        state_limit: 40,
         epoch_limit: 2,
         ..at(0.9)
     };
@@ -174,7 +175,7 @@ fn too_many_clusters_end_exploration_with_a_clear_statement() {
     let notes = notes.0.into_inner().unwrap();
     let said = notes
         .iter()
-        .any(|note| note.contains("limit of 40 clusters") && note.contains("cluster_limit"));
+        .any(|note| note.contains("limit of 40 states") && note.contains("state_limit"));
     assert!(said, "{notes:?}");
 }
 
@@ -183,11 +184,11 @@ fn vigilance_that_tunes_itself_stops_at_the_limit_and_keeps_the_best() {
     let model = model("cart-load-unload");
     let settings = Settings {
         vigilances: vec![0.1, 0.5, 0.9, 0.95],
-        cluster_limit: 60,
+        state_limit: 60,
         ..Settings::default()
     };
     let learned = learn(&model, &settings);
-    // 0.1 cannot tell loaded from empty; 0.9 needs too many, so that 0.95 is not tried.
+    // At 0.1 loaded and empty are told apart poorly; 0.9 needs too many, so that 0.95 is not tried.
     assert!(learned.learning.vigilance > 0.1);
     assert!(
         learned
@@ -205,6 +206,36 @@ fn vigilance_that_tunes_itself_stops_at_the_limit_and_keeps_the_best() {
     );
 }
 
+/// Two docks, and which way the shuttle faces is to be told from the last three steps.
+#[test]
+fn a_longer_memory_finds_which_way_the_shuttle_faces_and_merges_into_a_handful_of_states() {
+    let model = model("shuttle");
+    let short = Settings {
+        lambda: 0.9,
+        ..at(0.5)
+    };
+    let long = Settings {
+        depth: 3,
+        state_limit: 1_000,
+        merge: true,
+        ..short.clone()
+    };
+    let told = closed::Settings::default();
+    let options = Options {
+        episodes: 2_000,
+        ..OPTIONS
+    };
+    let best = yardsticks(&model, &told, options, &Silent).unwrap()[0].earned;
+    let share = |learned: &Learned| {
+        earned(&model, &learned.automaton).discounted.mean / best.discounted.mean
+    };
+    let (short, long) = (learn(&model, &short), learn(&model, &long));
+    let (one, three) = (share(&short), share(&long));
+    assert!(three >= 0.85 && three > 1.5 * one, "{one} and {three}");
+    let nodes = long.automaton.nodes.len();
+    assert!(10 * nodes < long.learning.states, "{nodes}");
+}
+
 #[test]
 fn an_automaton_runs_from_its_file_as_it_was_learned() {
     let model = model("cart-load-unload");
@@ -213,12 +244,12 @@ fn an_automaton_runs_from_its_file_as_it_was_learned() {
     let read = Automaton::from_json(&text, "test").unwrap();
     assert_eq!(read, learned.automaton);
     assert_eq!(earned(&model, &read), earned(&model, &learned.automaton));
-    // One cluster less than modes is a damaged file.
+    // A mode that there is none of makes a damaged file.
     let mut damaged: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let clusters = damaged
-        .pointer_mut("/automaton/filter/recall/clusters")
+    let next = damaged
+        .pointer_mut("/automaton/filter/recall/next/0")
         .unwrap();
-    clusters.as_array_mut().unwrap().pop();
+    *next = learned.automaton.modes.len().into();
     let error = Automaton::from_json(&damaged.to_string(), "test").unwrap_err();
     assert!(matches!(error, Error::Policy { .. }), "{error}");
 }
@@ -304,23 +335,9 @@ fn settings_out_of_range_are_refused_by_name() {
             },
         ),
         (
-            "before",
+            "depth",
             Settings {
-                before: 2.0,
-                ..Settings::default()
-            },
-        ),
-        (
-            "past",
-            Settings {
-                past: 1.0,
-                ..Settings::default()
-            },
-        ),
-        (
-            "action",
-            Settings {
-                action: f64::INFINITY,
+                depth: 17,
                 ..Settings::default()
             },
         ),
@@ -332,9 +349,9 @@ fn settings_out_of_range_are_refused_by_name() {
             },
         ),
         (
-            "cluster_limit",
+            "state_limit",
             Settings {
-                cluster_limit: 0,
+                state_limit: 0,
                 ..Settings::default()
             },
         ),

@@ -36,7 +36,7 @@ fn small(model: &Model, form: Form) -> SolveSettings {
             scout: 200,
             settle: 50,
             explore_limit: 1000,
-            cluster_limit: 20,
+            state_limit: 20,
             epoch: 500,
             epoch_per_entry: 1,
             epoch_limit: 2,

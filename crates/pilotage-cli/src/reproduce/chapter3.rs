@@ -103,6 +103,8 @@ pub fn table_3_1(_: &Context<'_>) -> Result<Finding, Failure> {
 
 /// One seed.
 struct Run {
+    /// Steps remembered.
+    depth: usize,
     learned: Learned,
     earned: Evaluation,
 }
@@ -127,6 +129,22 @@ fn at(vigilance: f64, seed: u64) -> arkaq::Settings {
     }
 }
 
+/// As [`at`], remembering more steps and with Q(lambda).
+fn remembering(vigilance: f64, seed: u64) -> arkaq::Settings {
+    let arkaq::Settings {
+        depth,
+        state_limit,
+        lambda,
+        ..
+    } = arkaq::Settings::extended();
+    arkaq::Settings {
+        depth,
+        state_limit,
+        lambda,
+        ..at(vigilance, seed)
+    }
+}
+
 fn runs(
     context: &Context<'_>,
     model: &Model,
@@ -135,9 +153,15 @@ fn runs(
     seeds(context)
         .into_par_iter()
         .map(|seed| {
-            let learned = learn(model, settings(seed))?;
+            let settings = settings(seed);
+            let depth = settings.depth;
+            let learned = learn(model, settings)?;
             let earned = earned(model, &learned.automaton, evaluation(context));
-            Ok(Run { learned, earned })
+            Ok(Run {
+                depth,
+                learned,
+                earned,
+            })
         })
         .collect()
 }
@@ -149,6 +173,8 @@ struct Problem {
     thesis: &'static str,
     /// Vigilances to learn at; the drawings are of the first.
     vigilances: &'static [f64],
+    /// Vigilances to learn at once more, remembering as many steps as [`arkaq::Settings::extended`] and with Q(lambda).
+    remembering: &'static [f64],
     /// Share of the yardstick, in %, from which on it counts as solved.
     solved: f64,
 }
@@ -159,18 +185,18 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
     let mut draft = Draft::new(one.title, one.thesis);
     let mut rows = Vec::new();
     let mut highest = f64::NEG_INFINITY;
-    let (mut nodes, mut earnings) = (Vec::new(), Vec::new());
+    let (mut clusters, mut nodes, mut earnings) = (Vec::new(), Vec::new(), Vec::new());
     // A quick look is at the ends of the range.
     let ends = [one.vigilances[0], one.vigilances[one.vigilances.len() - 1]];
     let vigilances: &[f64] = if context.quick { &ends } else { one.vigilances };
-    for &vigilance in vigilances {
-        let found = runs(context, &model, &|seed| at(vigilance, seed))?;
+    let mut row = |vigilance: f64, found: &[Run]| {
         let of = |value: &dyn Fn(&Run) -> f64| -> Vec<f64> { found.iter().map(value).collect() };
         let shares = of(&|run| 100.0 * run.earned.discounted.mean / best.discounted.mean);
         highest = highest.max(median_of(shares.clone()));
-        earnings.push((vigilance, median_of(shares.clone())));
-        let clusters = of(&|run| run.learned.automaton.nodes.len() as f64);
-        nodes.push((vigilance, median_of(clusters.clone())));
+        let [of_clusters, of_nodes] = [
+            of(&|run| run.learned.learning.clusters.len() as f64),
+            of(&|run| run.learned.automaton.nodes.len() as f64),
+        ];
         let count = |which: &dyn Fn(&Run) -> bool| {
             format!(
                 "{} of {}",
@@ -178,20 +204,31 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
                 found.len()
             )
         };
+        let medians = [&of_clusters, &of_nodes, &shares].map(|values| median_of(values.clone()));
         rows.push([
             vigilance.to_string(),
-            spread(clusters, 0),
+            found.first().map_or(0, |run| run.depth).to_string(),
+            spread(of_clusters, 0),
+            spread(of_nodes, 0),
             spread(shares, 1),
             spread(of(&|run| run.learned.samples as f64 / 1000.0), 0),
             count(&|run| run.learned.converged),
             count(&|run| run.learned.learning.capped),
         ]);
+        medians
+    };
+    for &vigilance in vigilances {
+        let found = runs(context, &model, &|seed| at(vigilance, seed))?;
+        let [of_clusters, of_nodes, share] = row(vigilance, &found);
+        clusters.push((vigilance, of_clusters));
+        nodes.push((vigilance, of_nodes));
+        earnings.push((vigilance, share));
         if let (true, Some(first)) = (vigilance == one.vigilances[0], found.first()) {
             let learning = Learning::Arkaq(first.learned.learning.clone());
             let automaton = &first.learned.automaton;
             draft = draft
                 .automaton(
-                    format!("Clusters identified at vigilance {vigilance}"),
+                    format!("States identified at vigilance {vigilance}"),
                     automaton,
                 )?
                 .figure("Q-values while learning", values_svg(automaton, &learning)?)
@@ -201,7 +238,13 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
                 );
         }
     }
-    let growing = nodes.windows(2).all(|pair| pair[0].1 <= pair[1].1);
+    for &vigilance in one.remembering {
+        row(
+            vigilance,
+            &runs(context, &model, &|seed| remembering(vigilance, seed))?,
+        );
+    }
+    let growing = clusters.windows(2).all(|pair| pair[0].1 <= pair[1].1);
     let by_vigilance = |name: &str, points: Vec<(f64, f64)>| {
         [Series {
             name: name.to_owned(),
@@ -213,7 +256,12 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
         .curves(
             "Clusters by vigilance",
             ("vigilance", "clusters"),
-            &by_vigilance("clusters", nodes),
+            &by_vigilance("clusters", clusters),
+        )?
+        .curves(
+            "States by vigilance",
+            ("vigilance", "states"),
+            &by_vigilance("states", nodes),
         )?
         .curves(
             "Return by vigilance",
@@ -223,7 +271,16 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
     Ok(draft
         .table(
             format!("ARKAQ over {} seeds: median (least to greatest); the yardstick, closed-loop KBVI, earns {}", seeds(context).len(), shown(best.discounted)),
-            ["vigilance", "clusters", "% of the yardstick", "thousand steps", "converged", "stopped by the cap"],
+            [
+                "vigilance",
+                "steps remembered",
+                "clusters",
+                "states",
+                "% of the yardstick",
+                "thousand steps",
+                "converged",
+                "stopped by the cap",
+            ],
             rows,
         )
         .verdict(judge(
@@ -247,6 +304,7 @@ pub fn figure_3_4(context: &Context<'_>) -> Result<Finding, Failure> {
             title: "Figures 3.4, 3.5 and 3.6: ARKAQ in the basic world",
             thesis: "Two states at vigilance 0.1 and four at 0.9, the goal always apart; Q-values converge without swinging.",
             vigilances: &[0.1, 0.3, 0.5, 0.7, 0.9],
+            remembering: &[],
             solved: 97.0,
         },
     )
@@ -260,6 +318,7 @@ pub fn figure_3_8(context: &Context<'_>) -> Result<Finding, Failure> {
             title: "Figures 3.8, 3.9 and 3.10: ARKAQ in the 4x4 maze",
             thesis: "At vigilance 0.1 some states have no clear action; at 0.9 fewer.",
             vigilances: &[0.1, 0.3, 0.5, 0.7, 0.9],
+            remembering: &[],
             solved: 95.0,
         },
     )
@@ -273,6 +332,7 @@ pub fn figure_3_11(context: &Context<'_>) -> Result<Finding, Failure> {
             title: "Figure 3.11: ARKAQ and the hidden load",
             thesis: "At vigilance 0.8 the previous state reveals whether the cart is loaded; nine states (4.3.3).",
             vigilances: &[0.5, 0.8],
+            remembering: &[],
             solved: 85.0,
         },
     )
@@ -286,6 +346,7 @@ pub fn figure_3_13(context: &Context<'_>) -> Result<Finding, Failure> {
             title: "Figures 3.13 and 3.14: ARKAQ and the four stations",
             thesis: "It settles on one pair of stations, the first it found.",
             vigilances: &[0.5, 0.8],
+            remembering: &[],
             solved: 85.0,
         },
     )
@@ -299,6 +360,7 @@ pub fn figure_3_15(context: &Context<'_>) -> Result<Finding, Failure> {
             title: "Figures 3.15 and 3.16: ARKAQ and the shuttle",
             thesis: "The hidden state is revealed, as with the load.",
             vigilances: &[0.5, 0.9],
+            remembering: &[0.5],
             solved: 85.0,
         },
     )

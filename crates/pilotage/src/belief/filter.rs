@@ -131,7 +131,7 @@ impl Filter {
         }
     }
 
-    /// The same filter with modes that are clusters, from the start on.
+    /// The same filter with modes that are what is remembered of clusters, from the start on.
     pub fn recalling(mut self, recall: Recall) -> Self {
         self.start.1 = recall.first(&self.start.2);
         self.recall = Some(recall);
@@ -144,7 +144,7 @@ impl Filter {
         self
     }
 
-    /// The clusters that are its modes, where they are.
+    /// How it remembers clusters, where its modes are that.
     pub fn recall(&self) -> Option<&Recall> {
         self.recall.as_ref()
     }

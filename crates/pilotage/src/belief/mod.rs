@@ -14,4 +14,4 @@ pub use hypotheses::{Hypothesis, Merge, Tracker, Tracking};
 pub use kalman::{Correction, KalmanFilter};
 pub use levels::{ClassId, LevelGraph, LevelId};
 pub use mdp::BeliefMdp;
-pub use recall::{Cluster, Recall, Sight};
+pub use recall::{ClusterId, Clusters, Recall};

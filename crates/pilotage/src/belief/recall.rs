@@ -1,98 +1,64 @@
-//! Memory by clusters (thesis 3.2): what is remembered is the cluster that the last belief fell into, and the next one depends on it.
+//! Memory by clusters (thesis 3.2): what is remembered is the clusters that the last beliefs fell into, and the actions between them.
 //!
-//! A cluster stands for belief means that were reached from similar places by similar actions. Its number is the mode of a belief,
-//! so that clusters at the same place with different pasts can tell what no sensor shows.
+//! The mean of a belief falls into the nearest cluster. A mode of the belief stands for what is remembered, so that modes in the same
+//! cluster with different pasts can tell what no sensor shows. How modes follow one another is a table: a finite automaton that is fed
+//! with actions and clusters.
 
 use serde::{Deserialize, Serialize};
 
 use crate::model::{ActionId, Interval, ModeId, Model};
 
-/// The centre of a cluster: what it is, and what came before it.
+/// Number of a cluster.
+pub type ClusterId = usize;
+
+/// Clusters of belief means: a mean is in the one whose centre is nearest, lengths measured by the world's outer bounds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Cluster {
-    /// The beliefs in it.
-    pub now: Sight,
-    /// What the cluster before passed on.
-    pub before: Sight,
+pub struct Clusters {
+    bounds: Vec<Interval>,
+    /// By cluster, length `n`, in units of the state.
+    centres: Vec<Vec<f64>>,
 }
 
-/// Where a cluster is and what led there.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Sight {
-    /// Mean belief, length `n`, scaled to `[0, 1]` over the world's outer bounds.
-    pub place: Vec<f64>,
-    /// How much each action led to it, in `[0, 1]`; all 0 where an episode starts.
-    pub actions: Vec<f64>,
-}
-
-/// Finds the next cluster from the one before, the action and the mean.
+/// Finds the next mode from the one before, the action and the mean.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Recall {
-    /// Bounds of the state variables.
-    bounds: Vec<Interval>,
-    weights: Weights,
-    clusters: Vec<Cluster>,
+    clusters: Clusters,
+    actions: usize,
+    /// By cluster: the mode of an episode that starts in it.
+    first: Vec<ModeId>,
+    /// By mode, action and cluster: the mode afterwards.
+    next: Vec<ModeId>,
 }
 
-/// Weights of what a cluster is told apart by. Squared distances are 1 between opposite corners of the world, and between two actions.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Weights {
-    /// Of the cluster before, against 1 of the belief itself; at least 0.
-    pub before: f64,
-    /// How much a cluster passes on of the one before it, in `[0, 1)`; the rest is itself. With 0 memory reaches one cluster back.
-    pub past: f64,
-    /// Of actions, against 1 of places; at least 0.
-    pub action: f64,
-}
-
-impl Recall {
+impl Clusters {
     /// Clusters, at least one, in the bounds of a model, which are finite.
-    pub fn new(model: &Model, weights: Weights, clusters: Vec<Cluster>) -> Self {
+    pub fn new(model: &Model, centres: Vec<Vec<f64>>) -> Self {
         Self {
             bounds: model.state.iter().map(|variable| variable.bounds).collect(),
-            weights,
-            clusters,
+            centres,
         }
     }
 
-    /// The clusters; a mode is the number of one.
-    pub fn clusters(&self) -> &[Cluster] {
-        &self.clusters
+    /// Number of clusters.
+    pub fn len(&self) -> usize {
+        self.centres.len()
     }
 
-    /// What they are told apart by.
-    pub fn weights(&self) -> Weights {
-        self.weights
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.centres.is_empty()
     }
 
-    /// The cluster of the mean an episode starts with: it comes from where it is, by no action.
-    pub fn first(&self, mean: &[f64]) -> ModeId {
-        self.nearest(|cluster| {
-            let apart = |sight: &Sight| {
-                self.to_mean(sight, mean) + self.weights.action * led(&sight.actions, None)
-            };
-            apart(&cluster.now) + self.weights.before * apart(&cluster.before)
-        })
+    /// Their centres, in units of the state.
+    pub fn centres(&self) -> &[Vec<f64>] {
+        &self.centres
     }
 
-    /// The cluster of a mean reached by an action from another cluster. Allocates nothing.
-    pub fn next(&self, before: ModeId, action: ActionId, mean: &[f64]) -> ModeId {
-        let from = &self.clusters[before];
-        let passed = |now: &[f64], before: &[f64], i: usize| self.weights.passed(now[i], before[i]);
-        let place = |i| passed(&from.now.place, &from.before.place, i);
-        let led_by = |i| passed(&from.now.actions, &from.before.actions, i);
-        self.nearest(|cluster| {
-            self.to_mean(&cluster.now, mean)
-                + self.weights.action * led(&cluster.now.actions, Some(action))
-                + self.weights.before * self.weights.apart(&cluster.before, place, led_by)
-        })
-    }
-
-    /// The first cluster at the least distance.
-    fn nearest(&self, distance: impl Fn(&Cluster) -> f64) -> ModeId {
+    /// The cluster of a mean; the first of equals. Allocates nothing.
+    pub fn nearest(&self, mean: &[f64]) -> ClusterId {
         let mut best = (0, f64::INFINITY);
-        for (id, cluster) in self.clusters.iter().enumerate() {
-            let distance = distance(cluster);
+        for (id, centre) in self.centres.iter().enumerate() {
+            let distance = self.distance(centre, mean);
             if distance < best.1 {
                 best = (id, distance);
             }
@@ -100,68 +66,92 @@ impl Recall {
         best.0
     }
 
-    /// Squared distance of a place and a mean, 1 for opposite corners.
-    fn to_mean(&self, sight: &Sight, mean: &[f64]) -> f64 {
-        let variables = self.bounds.iter().zip(mean);
-        let squares = variables.zip(&sight.place).map(|((bounds, m), x)| {
-            let apart = x - scaled(bounds, *m);
+    /// Squared distance between two clusters, 1 for opposite corners of the world.
+    pub fn between(&self, a: ClusterId, b: ClusterId) -> f64 {
+        self.distance(&self.centres[a], &self.centres[b])
+    }
+
+    fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
+        let variables = self.bounds.iter().zip(a.iter().zip(b));
+        let squares = variables.map(|(bounds, (a, b))| {
+            let apart = scaled(bounds, *a) - scaled(bounds, *b);
             apart * apart
         });
-        squares.sum::<f64>() / mean.len() as f64
+        squares.sum::<f64>() / a.len() as f64
+    }
+
+    fn fits(&self, states: usize) -> bool {
+        let finite = |bounds: &Interval| bounds.width() > 0.0 && bounds.width().is_finite();
+        let place =
+            |centre: &Vec<f64>| centre.len() == states && centre.iter().all(|x| x.is_finite());
+        !self.is_empty()
+            && self.bounds.len() == states
+            && self.bounds.iter().all(finite)
+            && self.centres.iter().all(place)
+    }
+}
+
+impl Recall {
+    /// A table of modes: `first` by cluster; `next` by mode, action and cluster, the cluster running fastest.
+    pub fn new(clusters: Clusters, actions: usize, first: Vec<ModeId>, next: Vec<ModeId>) -> Self {
+        Self {
+            clusters,
+            actions,
+            first,
+            next,
+        }
+    }
+
+    /// The clusters that means fall into.
+    pub fn clusters(&self) -> &Clusters {
+        &self.clusters
+    }
+
+    /// The mode of the mean that an episode starts with.
+    pub fn first(&self, mean: &[f64]) -> ModeId {
+        self.first[self.clusters.nearest(mean)]
+    }
+
+    /// The mode of a mean that was reached by an action. Allocates nothing.
+    pub fn next(&self, before: ModeId, action: ActionId, mean: &[f64]) -> ModeId {
+        let row = (before * self.actions + action) * self.clusters.len();
+        self.next[row + self.clusters.nearest(mean)]
+    }
+
+    /// The same with some modes put for others: `into` says by mode which one, itself if it stays. Those that stay keep their order.
+    pub fn merged(&self, into: &[ModeId]) -> Self {
+        let stays = |mode: ModeId| into[mode] == mode;
+        let mut number = vec![0; into.len()];
+        let mut stayed = 0;
+        for mode in (0..into.len()).filter(|mode| stays(*mode)) {
+            number[mode] = stayed;
+            stayed += 1;
+        }
+        let renumbered = |mode: &ModeId| number[into[*mode]];
+        let rows = self.next.chunks(self.actions * self.clusters.len());
+        let kept = rows.enumerate().filter(|(mode, _)| stays(*mode));
+        Self {
+            clusters: self.clusters.clone(),
+            actions: self.actions,
+            first: self.first.iter().map(renumbered).collect(),
+            next: kept
+                .flat_map(|(_, row)| row.iter().map(renumbered))
+                .collect(),
+        }
     }
 
     /// Whether sizes and numbers are as they have to be.
     pub(super) fn fits(&self, states: usize, actions: usize, modes: usize) -> bool {
-        let holds = |values: &[f64], size: usize| {
-            values.len() == size && values.iter().all(|value| value.is_finite())
-        };
-        let weight = |weight: f64| weight >= 0.0 && weight.is_finite();
-        self.bounds.len() == states
-            && self
-                .bounds
-                .iter()
-                .all(|bounds| bounds.width() > 0.0 && bounds.width().is_finite())
-            && weight(self.weights.before)
-            && weight(self.weights.action)
-            && weight(self.weights.past)
-            && self.clusters.len() == modes
-            && self
-                .clusters
-                .iter()
-                .flat_map(|cluster| [&cluster.now, &cluster.before])
-                .all(|sight| holds(&sight.place, states) && holds(&sight.actions, actions))
+        let is_mode = |mode: &ModeId| *mode < modes;
+        self.clusters.fits(states)
+            && self.actions == actions
+            && self.first.len() == self.clusters.len()
+            && self.next.len() == modes * actions * self.clusters.len()
+            && self.first.iter().chain(&self.next).all(is_mode)
     }
-}
-
-impl Weights {
-    /// Squared distance of two clusters.
-    pub fn between(&self, a: &Cluster, b: &Cluster) -> f64 {
-        let apart = |a: &Sight, b: &Sight| self.apart(a, |i| b.place[i], |i| b.actions[i]);
-        apart(&a.now, &b.now) + self.before * apart(&a.before, &b.before)
-    }
-
-    /// A component of what a cluster passes on, from those of itself and of what was passed on to it.
-    pub fn passed(&self, now: f64, before: f64) -> f64 {
-        now + self.past * (before - now)
-    }
-
-    fn apart(&self, a: &Sight, place: impl Fn(usize) -> f64, led_by: impl Fn(usize) -> f64) -> f64 {
-        squares(&a.place, place) / a.place.len() as f64
-            + 0.5 * self.action * squares(&a.actions, led_by)
-    }
-}
-
-fn squares(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
-    let squares = a.iter().enumerate().map(|(i, a)| (a - b(i)) * (a - b(i)));
-    squares.sum()
 }
 
 /// A number scaled to `[0, 1]` over finite bounds; one outside is that of the nearest end.
 pub fn scaled(bounds: &Interval, x: f64) -> f64 {
     ((x - bounds.low) / bounds.width()).clamp(0.0, 1.0)
-}
-
-/// Half the squared distance from an action as a unit vector, or from none as the zero vector: 1 between two actions.
-fn led(actions: &[f64], action: Option<ActionId>) -> f64 {
-    0.5 * squares(actions, |i| f64::from(u8::from(Some(i) == action)))
 }

@@ -21,17 +21,14 @@ pub fn returns_svg(automaton: &Automaton, learning: &Learning) -> Result<String>
     curves_svg(&title, STEPS, "reward a step", &series)
 }
 
-/// Draws `Q` of the best action: one line for the middle of every region learned last, or for every cluster.
+/// Draws `Q` of the best action: one line for the middle of every region learned last, or for every state.
 ///
 /// # Errors
 /// As [`curves_svg`].
 pub fn values_svg(automaton: &Automaton, learning: &Learning) -> Result<String> {
     let (series, label) = match learning {
         Learning::Kafaq(learning) => (of_regions(automaton, learning), "Q of the region's action"),
-        Learning::Arkaq(learning) => (
-            of_clusters(automaton, learning),
-            "Q of the cluster's action",
-        ),
+        Learning::Arkaq(learning) => (of_states(automaton, learning), "Q of the state's action"),
     };
     let title = format!("{}: action values while learning", automaton.problem);
     curves_svg(&title, STEPS, label, &series)
@@ -91,22 +88,22 @@ fn of_regions(automaton: &Automaton, learning: &kafaq::Learning) -> Vec<Series> 
     regions.iter().map(line).collect()
 }
 
-/// Most clusters whose values are drawn: those founded first.
-const MOST_CLUSTERS: usize = 12;
+/// Most states whose values are drawn: those met first.
+const MOST_STATES: usize = 12;
 
-fn of_clusters(automaton: &Automaton, learning: &arkaq::Learning) -> Vec<Series> {
+fn of_states(automaton: &Automaton, learning: &arkaq::Learning) -> Vec<Series> {
     let epochs = || {
         let kept = |point: &&arkaq::Point| point.vigilance == learning.vigilance;
         learning.curve.iter().filter(kept)
     };
     let last = epochs()
         .next_back()
-        .map_or([].as_slice(), |last| &last.clusters);
+        .map_or([].as_slice(), |last| &last.states);
     let line = |(id, &(action, _)): (usize, &(usize, f64))| {
         let action = automaton.actions.get(action).map_or("?", String::as_str);
-        let value = |point: &arkaq::Point| point.clusters.get(id).map_or(f64::NAN, |one| one.1);
+        let value = |point: &arkaq::Point| point.states.get(id).map_or(f64::NAN, |one| one.1);
         Series {
-            name: format!("cluster {id}, {action}"),
+            name: format!("state {id}, {action}"),
             points: epochs()
                 .map(|point| (point.samples as f64, value(point)))
                 .collect(),
@@ -115,7 +112,7 @@ fn of_clusters(automaton: &Automaton, learning: &arkaq::Learning) -> Vec<Series>
     };
     last.iter()
         .enumerate()
-        .take(MOST_CLUSTERS)
+        .take(MOST_STATES)
         .map(line)
         .collect()
 }

@@ -1,59 +1,73 @@
-//! The automaton as it is learned: clusters with actions and values.
+//! The automaton as it is learned: states with actions and values.
 
 use serde::{Deserialize, Serialize};
 
+use super::history::History;
 use super::task::{SOLVER, Task};
-use crate::belief::recall::Weights;
-use crate::belief::{Cluster, Recall};
-use crate::model::ActionId;
+use crate::belief::Recall;
+use crate::model::{ActionId, ModeId};
 use crate::policy::{Automaton, Matching, Node, Place};
 
 /// Nodes before they are compiled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Draft {
-    pub weights: Weights,
+    pub recall: Recall,
     pub nodes: Vec<DraftNode>,
 }
 
-/// A cluster, what to do in it, and what that is worth.
+/// What is remembered, what to do then, and what that is worth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct DraftNode {
-    pub cluster: Cluster,
+    pub history: History,
     pub action: ActionId,
     pub value: f64,
 }
 
 impl Draft {
-    /// The automaton that a controller runs. Its filter recalls the clusters: each is a mode, with one node.
+    /// The same with some nodes put for others: `into` says by node which one, itself if it stays.
+    pub fn merged(&self, into: &[ModeId]) -> Self {
+        let nodes = self.nodes.iter().enumerate();
+        let kept = nodes.filter(|(id, _)| into[*id] == *id);
+        Self {
+            recall: self.recall.merged(into),
+            nodes: kept.map(|(_, node)| node.clone()).collect(),
+        }
+    }
+
+    /// How far two nodes are from each other.
+    pub fn apart(&self, a: usize, b: usize) -> f64 {
+        let clusters = self.recall.clusters();
+        self.nodes[a]
+            .history
+            .apart(&self.nodes[b].history, clusters)
+    }
+
+    /// The automaton that a controller runs. What its filter recalls are its modes, with one node each.
     pub fn compile(&self, task: &Task<'_>) -> Automaton {
         let mut automaton = Automaton::new(&task.mdp, SOLVER, Matching::Nearest);
         automaton.fingerprint = task.fingerprint;
-        let state = &task.mdp.model().state;
-        automaton.scale = state
+        let model = task.mdp.model();
+        automaton.scale = model
+            .state
             .iter()
             .map(|variable| variable.bounds.width())
             .collect();
-        automaton.modes = (0..self.nodes.len())
-            .map(|id| format!("cluster {id}"))
-            .collect();
+        let name = |node: &DraftNode| node.history.name(&automaton.actions);
+        let modes = self.nodes.iter().map(name).collect();
+        automaton.modes = modes;
         let levels = 0..=automaton.levels.len() - 1;
+        let centres = self.recall.clusters().centres();
         let node = |(id, node): (usize, &DraftNode)| {
-            let places = state.iter().zip(&node.cluster.now.place);
-            let point = places
-                .map(|(variable, x)| variable.bounds.low + x * variable.bounds.width())
-                .collect();
             Node::new(
                 levels.clone(),
                 id,
-                Place::Point(point),
+                Place::Point(centres[node.history.cluster].clone()),
                 node.action,
                 Some(node.value),
             )
         };
         automaton.nodes = self.nodes.iter().enumerate().map(node).collect();
-        let clusters = self.nodes.iter().map(|node| node.cluster.clone()).collect();
-        let recall = Recall::new(task.mdp.model(), self.weights, clusters);
-        automaton.filter = task.filter.clone().recalling(recall);
+        automaton.filter = task.filter.clone().recalling(self.recall.clone());
         automaton
     }
 }

@@ -3,21 +3,23 @@
 //! The agent knows its own motion and sensor noise (`A`, `B`, `H`, `Q`, `R`), the world's outer bounds and its start belief. It sees
 //! actions, observations and rewards, and knows neither map nor rewards in advance. Learning has the two phases of Figure 3.2:
 //!
-//! 1. *The world model* (`world_model`): acting at random, the agent clusters its beliefs with the network [`art`], as seen from the
-//!    cluster before and by the action between (`coding`). The automaton thereby has a memory: its state is the cluster it is in,
-//!    and clusters at the same place with different pasts tell what no sensor shows.
-//! 2. *The policy* (`policy`): Q-learning with Boltzmann exploration on these clusters, which no longer change.
+//! 1. *The world model* (`world_model`): acting at random, the agent clusters its beliefs with the network [`art`], then takes note of
+//!    which clusters follow one another by which actions. A state of the automaton is the cluster it is in with the one before and the
+//!    action between (`history`): states in the same cluster with different pasts tell what no sensor shows.
+//! 2. *The policy* (`policy`): Q-learning with Boltzmann exploration on these states, which no longer change.
 //!
-//! The thesis' network makes clusters without end where much is continuous (3.4.6). Here [`Settings::cluster_limit`] ends exploration,
+//! The thesis' network makes clusters without end where much is continuous (3.4.6). Here [`Settings::state_limit`] ends exploration,
 //! and the result says so.
 //!
-//! Beyond the thesis, and what its chapter 7 asks for: vigilance that tunes itself ([`Settings::vigilances`]), merging of clusters
-//! that agree (`merge`), and Watkins' Q(lambda). [`Settings::extended`] has all three.
+//! Beyond the thesis, and what its chapter 7 asks for: vigilance that tunes itself ([`Settings::vigilances`]), merging of states
+//! that agree (`merge`), Watkins' Q(lambda), and a memory of more than one step ([`Settings::depth`]). [`Settings::extended`] has all
+//! four.
 
 pub mod art;
 mod checkpoint;
 mod coding;
 mod draft;
+mod history;
 mod merge;
 mod policy;
 mod settings;
@@ -31,7 +33,6 @@ use serde::{Deserialize, Serialize};
 pub use crate::solve::learn::Worlds;
 pub use settings::Settings;
 
-use crate::belief::Cluster;
 use crate::error::Result;
 use crate::model::{ActionId, Model};
 use crate::observe::Observer;
@@ -46,9 +47,9 @@ use world_model::WorldModel;
 /// What a learning run found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
-    /// The automaton, a node for each cluster. It runs without seeing rewards.
+    /// The automaton, a node for each state. It runs without seeing rewards.
     pub automaton: Automaton,
-    /// Whether no new clusters were found and the best actions had stopped changing.
+    /// Whether no new states were found and the best actions had stopped changing.
     pub converged: bool,
     /// Steps of experience, trials included.
     pub samples: u64,
@@ -59,12 +60,14 @@ pub struct Learned {
 /// How learning went.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learning {
-    /// Whether the world model is incomplete because it reached [`Settings::cluster_limit`].
+    /// Whether the world model is incomplete because it reached [`Settings::state_limit`].
     pub capped: bool,
     /// Vigilance of the network.
     pub vigilance: f64,
-    /// Clusters of the world model, before any were merged.
+    /// Clusters of the world model.
     pub clusters: Vec<ClusterFound>,
+    /// Its states, before any were merged.
+    pub states: usize,
     /// How learning went, epoch by epoch, at all vigilances tried.
     pub curve: Vec<Point>,
 }
@@ -73,14 +76,15 @@ impl Learning {
     /// What was found, in words.
     pub fn describe(&self) -> String {
         let cap = if self.capped {
-            ", stopped by `cluster_limit`"
+            ", stopped by `state_limit`"
         } else {
             ""
         };
         format!(
-            "{} clusters at vigilance {}{cap}",
+            "{} clusters at vigilance {}, {} states{cap}",
             self.clusters.len(),
-            self.vigilance
+            self.vigilance,
+            self.states
         )
     }
 }
@@ -88,8 +92,8 @@ impl Learning {
 /// A cluster of the world model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClusterFound {
-    /// Its centre.
-    pub centre: Cluster,
+    /// Its centre, length `n`, in units of the state.
+    pub centre: Vec<f64>,
     /// How much of it was rewarded notably, in `[0, 1]`.
     pub rewarded: f64,
     /// Steps of experience at which it was founded.
@@ -105,8 +109,8 @@ pub struct Point {
     pub samples: u64,
     /// Reward a step, exploration included.
     pub reward: f64,
-    /// By cluster: the best action and its value.
-    pub clusters: Vec<(ActionId, f64)>,
+    /// By state: the best action and its value.
+    pub states: Vec<(ActionId, f64)>,
 }
 
 /// Whether a model can be learned with these settings.
@@ -188,7 +192,7 @@ impl<'a> Run<'a> {
             experience,
             curve: Vec::new(),
             tried: 0,
-            policy: Policy::new(&task, world.recall.clusters().len()),
+            policy: Policy::new(&task, world.states.len()),
             world,
             best: None,
             finished: false,
@@ -210,7 +214,7 @@ impl<'a> Run<'a> {
         if state.finished {
             return Ok(());
         }
-        let clusters = state.world.recall.clusters().len();
+        let states = state.world.states.len();
         if state.policy.epochs() == 0 {
             observer.note(&state.world.describe());
         }
@@ -221,11 +225,11 @@ impl<'a> Run<'a> {
             vigilance: state.world.vigilance,
             samples,
             reward,
-            clusters: state.policy.choices(),
+            states: state.policy.choices(),
         });
         observer.progress("epochs", epochs, task.settings.epoch_limit as u64);
         observer.note(&format!(
-            "{samples} steps: {reward:.3} a step, {clusters} clusters"
+            "{samples} steps: {reward:.3} a step, {states} states"
         ));
         if state.policy.finished(task) {
             self.conclude(observer);
@@ -237,12 +241,7 @@ impl<'a> Run<'a> {
     /// Makes the automaton of a vigilance and keeps it if it earns surely more than the best so far.
     fn conclude(&mut self, observer: &dyn Observer) {
         let (task, state) = (&self.task, &mut self.state);
-        let mut draft = state.policy.draft(&state.world);
-        if task.settings.merge {
-            let steps;
-            (draft, steps) = merge::merge(task, draft);
-            state.experience.samples += steps;
-        }
+        let draft = state.policy.draft(&state.world);
         let mut adopted = true;
         if task.settings.vigilances.len() > 1 {
             let trial = task.trial(&draft.compile(task));
@@ -268,18 +267,27 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Explores at the next vigilance. One that reached the limit of clusters is the last, as a higher one would reach it too.
+    /// Explores at the next vigilance. One that reached the limit of states is the last, as a higher one would reach it too.
     fn next_vigilance(&mut self) -> Result<()> {
         let (task, state) = (&self.task, &mut self.state);
         state.tried += 1;
         match task.settings.vigilances.get(state.tried) {
             Some(&vigilance) if !state.world.capped => {
                 state.world = world_model::generate(task, vigilance, &mut state.experience)?;
-                state.policy = Policy::new(task, state.world.recall.clusters().len());
+                state.policy = Policy::new(task, state.world.states.len());
             }
-            _ => state.finished = true,
+            _ => self.finish(),
         }
         Ok(())
+    }
+
+    /// Merges the states of the best automaton.
+    fn finish(&mut self) {
+        let (task, state) = (&self.task, &mut self.state);
+        state.finished = true;
+        if let Some(best) = state.best.as_mut().filter(|_| task.settings.merge) {
+            state.experience.samples += merge::merge(task, &mut best.draft);
+        }
     }
 
     /// What was learned so far; before the first vigilance is done with, what its values say.
@@ -298,6 +306,7 @@ impl<'a> Run<'a> {
                 capped: best.world.capped,
                 vigilance: best.world.vigilance,
                 clusters: best.world.clusters(),
+                states: best.world.states.len(),
                 curve: state.curve.clone(),
             },
         }

@@ -1,4 +1,4 @@
-//! PolicyGenerator (Figure 3.2): Q-learning on the clusters of the world model.
+//! PolicyGenerator (Figure 3.2): Q-learning on the states of the world model.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,13 +9,13 @@ use crate::belief::Filter;
 use crate::model::{ActionId, Then};
 use crate::solve::learn::{Actor, Experience, Table, Transition, boltzmann};
 
-/// Values of the clusters, as far as they are learned.
+/// Values of the states, as far as they are learned.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Policy {
     table: Table,
-    /// By cluster: the best action at the end of the last epoch.
+    /// By state: the best action at the end of the last epoch.
     best: Vec<ActionId>,
-    /// By cluster: visits in the last epoch.
+    /// By state: visits in the last epoch.
     visits: Vec<f64>,
     epoch: usize,
     calm: usize,
@@ -24,11 +24,11 @@ pub(super) struct Policy {
 
 impl Policy {
     /// Nothing learned yet.
-    pub fn new(task: &Task<'_>, clusters: usize) -> Self {
+    pub fn new(task: &Task<'_>, states: usize) -> Self {
         Self {
-            table: Table::new(clusters, task.actions()),
-            best: vec![0; clusters],
-            visits: vec![0.0; clusters],
+            table: Table::new(states, task.actions()),
+            best: vec![0; states],
+            visits: vec![0.0; states],
             epoch: 0,
             calm: 0,
             temperature: task.settings.hot,
@@ -50,7 +50,7 @@ impl Policy {
         self.epoch
     }
 
-    /// Acts for an epoch of whole episodes; `filter` recalls the clusters. Returns the reward of a step.
+    /// Acts for an epoch of whole episodes; `filter` recalls the states. Returns the reward of a step.
     pub fn run_epoch(
         &mut self,
         task: &Task<'_>,
@@ -125,23 +125,23 @@ impl Policy {
         self.temperature = (self.temperature * settings.cooling).max(settings.cold);
     }
 
-    /// By cluster: the best action and its value.
+    /// By state: the best action and its value.
     pub fn choices(&self) -> Vec<(ActionId, f64)> {
         let best = self.best.iter().enumerate();
         best.map(|(row, &action)| (action, self.table.best(row)))
             .collect()
     }
 
-    /// The clusters with their best actions and values.
+    /// The states with their best actions and values.
     pub fn draft(&self, world: &WorldModel) -> Draft {
-        let clusters = world.recall.clusters().iter().enumerate();
-        let nodes = clusters.map(|(row, cluster)| DraftNode {
-            cluster: cluster.clone(),
+        let states = world.states.iter().enumerate();
+        let nodes = states.map(|(row, history)| DraftNode {
+            history: history.clone(),
             action: self.best[row],
             value: self.table.best(row),
         });
         Draft {
-            weights: world.recall.weights(),
+            recall: world.recall.clone(),
             nodes: nodes.collect(),
         }
     }

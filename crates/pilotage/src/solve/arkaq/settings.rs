@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::error::Result;
 use crate::solve::learn::{Rates, ensure, set};
 
+/// Largest [`Settings::depth`].
+const MOST_DEPTH: usize = 16;
+
 /// Settings of ARKAQ-learning. Lengths are shares of the world, rewards shares of the range of the rewards that were met, so that the
 /// defaults do not depend on a problem's units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -16,22 +19,18 @@ pub struct Settings {
     pub vigilances: Vec<f64>,
     /// How far the centre of a cluster moves to a belief that falls into it, `beta` of Eq. 3.1, in `[0, 1]`.
     pub rate: f64,
-    /// Weight of the cluster before, against 1 of the mean; in `[0, 1]`. With 0 it is forgotten.
-    pub before: f64,
-    /// How much a cluster passes on of the one before it, in `[0, 1)`; the rest is itself. With 0 memory reaches one cluster back.
-    pub past: f64,
-    /// Weight of the last action, against 1 of the mean; in `[0, 1]`. With 0 it is forgotten.
-    pub action: f64,
+    /// Steps that are remembered, each the action and the cluster it was taken in: at most 16; 1 in the thesis.
+    pub depth: usize,
     /// A reward of this share of the largest one met sets a cluster apart while the world is explored; in `(0, 1]`.
     pub notable: f64,
     /// Steps that find out how large rewards are before clusters are made.
     pub scout: usize,
-    /// Steps without a new cluster that end the exploration; at least 1.
+    /// Steps without a new cluster, then without a new state, that end the exploration; at least 1.
     pub settle: usize,
-    /// Most steps of exploration; at least 1.
+    /// Most steps of exploration for clusters, and for states; at least 1.
     pub explore_limit: usize,
-    /// Most clusters; at least 1. Exploration that reaches it ends there, and learning goes on with those there are.
-    pub cluster_limit: usize,
+    /// Most clusters, and most states; at least 1. Exploration that reaches it ends there, and learning goes on with those there are.
+    pub state_limit: usize,
     /// Watkins' lambda, in `[0, 1]`; 0 is one-step Q-learning.
     pub lambda: f64,
     /// Learning rate of values, `max(rate_floor, (1 + n)^-rate_power)` at the n-th visit; the power is in `(0.5, 1]`.
@@ -48,7 +47,7 @@ pub struct Settings {
     pub explore: f64,
     /// Least steps of an epoch; at least 1.
     pub epoch: usize,
-    /// Steps of an epoch for every cluster and action; at least 1.
+    /// Steps of an epoch for every state and action; at least 1.
     pub epoch_per_entry: usize,
     /// Most epochs; at least 1. A run that reaches it has not converged.
     pub epoch_limit: usize,
@@ -56,7 +55,7 @@ pub struct Settings {
     pub still: f64,
     /// Calm epochs in a row that mean convergence; at least 1.
     pub calm: usize,
-    /// Whether clusters that agree in action and value are merged.
+    /// Whether states that agree in action and value are merged.
     pub merge: bool,
     /// Values agree that differ by at most this share of the range of values; in `[0, 1]`.
     pub agree: f64,
@@ -76,14 +75,12 @@ impl Default for Settings {
             seed: 1,
             vigilances: vec![0.8],
             rate: 0.05,
-            before: 0.5,
-            past: 0.0,
-            action: 0.5,
+            depth: 1,
             notable: 0.5,
             scout: 1_000,
             settle: 2_000,
             explore_limit: 50_000,
-            cluster_limit: 200,
+            state_limit: 200,
             lambda: 0.0,
             rate_power: 0.7,
             rate_floor: 0.01,
@@ -107,15 +104,14 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// ARKAQ with what the thesis left to be done (chapter 7): vigilance that tunes itself, clusters that merge, and Q(lambda); and with
-    /// a memory that reaches farther back than one cluster.
+    /// ARKAQ with what the thesis left to be done (chapter 7): vigilance that tunes itself, states that merge, and Q(lambda); and with a
+    /// memory that reaches farther back than one cluster.
     pub fn extended() -> Self {
         Self {
             vigilances: vec![0.1, 0.3, 0.5, 0.7, 0.8],
             lambda: 0.9,
-            before: 1.0,
-            past: 0.3,
-            action: 1.0,
+            depth: 3,
+            state_limit: 1_000,
             merge: true,
             ..Self::default()
         }
@@ -162,14 +158,6 @@ impl Settings {
         }
         let reals = [
             ("rate", self.rate, unit(self.rate), "0 to 1"),
-            ("before", self.before, unit(self.before), "0 to 1"),
-            (
-                "past",
-                self.past,
-                (0.0..1.0).contains(&self.past),
-                "from 0 up to, not including, 1",
-            ),
-            ("action", self.action, unit(self.action), "0 to 1"),
             (
                 "notable",
                 self.notable,
@@ -236,7 +224,7 @@ impl Settings {
             ("vigilances", self.vigilances.len()),
             ("settle", self.settle),
             ("explore_limit", self.explore_limit),
-            ("cluster_limit", self.cluster_limit),
+            ("state_limit", self.state_limit),
             ("epoch", self.epoch),
             ("epoch_per_entry", self.epoch_per_entry),
             ("epoch_limit", self.epoch_limit),
@@ -245,6 +233,7 @@ impl Settings {
         for (setting, value) in counts {
             ensure(setting, value, value >= 1, "at least 1")?;
         }
+        ensure("depth", self.depth, self.depth <= MOST_DEPTH, "0 to 16")?;
         ensure("trial", self.trial, self.trial >= 2, "at least 2")
     }
 }

@@ -1,53 +1,57 @@
-//! WorldModelGenerator (Figure 3.2): clusters of beliefs, found by acting at random.
+//! WorldModelGenerator (Figure 3.2): clusters of beliefs and the histories in which they follow one another, found by acting at random.
 
 use serde::{Deserialize, Serialize};
 
 use super::ClusterFound;
-use super::art::{Art, Match, Outcome, Rule, Settings as Network};
+use super::art::{Art, Outcome, Rule, Settings as Network};
 use super::coding::Coding;
+use super::history::{Histories, History};
 use super::task::Task;
 use crate::belief::Recall;
 use crate::error::Result;
-use crate::model::Then;
+use crate::model::{ActionId, Then};
 use crate::solve::learn::{Actor, Experience, any_action};
 
 /// What exploration found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct WorldModel {
     pub vigilance: f64,
-    /// The clusters, as the agent recalls them.
+    /// The states of the automaton.
+    pub states: Vec<History>,
+    /// How they follow one another.
     pub recall: Recall,
     /// By cluster: how much of it was rewarded, in `[0, 1]`.
     pub rewarded: Vec<f64>,
-    /// Whether no new cluster had been found for long.
-    pub settled: bool,
-    /// Whether a cluster would have been made that was not allowed.
-    pub capped: bool,
     /// Steps of experience at which each cluster was founded.
-    pub growth: Vec<u64>,
+    pub founded: Vec<u64>,
+    /// Whether neither a new cluster nor a new state had been found for long.
+    pub settled: bool,
+    /// Whether a cluster or a state would have been made that was not allowed.
+    pub capped: bool,
 }
 
 impl WorldModel {
     /// How exploration ended, in a sentence.
     pub fn describe(&self) -> String {
         let (vigilance, clusters) = (self.vigilance, self.recall.clusters().len());
+        let states = self.states.len();
         if self.capped {
             format!(
-                "vigilance {vigilance}: the limit of {clusters} clusters is reached and beliefs call for more; the policy is learned on \
-                 these; lower the vigilance or raise `cluster_limit`"
+                "vigilance {vigilance}: the limit of {states} states is reached, with {clusters} clusters, and beliefs call for more; the \
+                 policy is learned on these; lower the vigilance or `depth`, or raise `state_limit`"
             )
         } else {
-            format!("vigilance {vigilance}: {clusters} clusters")
+            format!("vigilance {vigilance}: {clusters} clusters, {states} states")
         }
     }
 
     /// The clusters, as a result tells of them.
     pub fn clusters(&self) -> Vec<ClusterFound> {
-        let clusters = self.recall.clusters().iter();
-        clusters
-            .zip(self.rewarded.iter().zip(&self.growth))
-            .map(|(cluster, (&rewarded, &founded))| ClusterFound {
-                centre: cluster.clone(),
+        let centres = self.recall.clusters().centres().iter();
+        centres
+            .zip(self.rewarded.iter().zip(&self.founded))
+            .map(|(centre, (&rewarded, &founded))| ClusterFound {
+                centre: centre.clone(),
                 rewarded,
                 founded,
             })
@@ -55,106 +59,188 @@ impl WorldModel {
     }
 }
 
-/// Acts at random until no new clusters are found, or there are too many.
+/// Acts at random until neither clusters nor states are new, or there are too many.
 pub(super) fn generate(
     task: &Task<'_>,
     vigilance: f64,
     experience: &mut Experience,
 ) -> Result<WorldModel> {
     let settings = &task.settings;
-    let coding = Coding::new(task);
-    let network = Network {
-        vigilance,
-        rate: settings.rate,
-        rule: Rule::Distance { extent: 1.0 },
-        limit: settings.cluster_limit,
-    };
-    let mut explorer = Explorer {
-        art: Art::new(coding.length(), network)?,
-        coding,
-        growth: Vec::new(),
-        capped: false,
-        since: 0,
-    };
-    let first = experience.samples + settings.scout as u64;
-    let limit = first + settings.explore_limit as u64;
-    let mut actor = Actor::new(task.worlds, &task.filter);
-    while !explorer.capped && explorer.since < settings.settle && experience.samples < limit {
-        let scouting = experience.samples < first;
-        let (mut draws, mut exploration) = experience.next_episode(settings.seed);
-        actor.reset(&mut draws);
-        let mut before = None;
-        if !scouting {
-            before = Some(explorer.start(&actor.belief.mean, experience)?);
-        }
-        for _ in 0..task.mdp.model().episode.length {
-            let action = any_action(task.actions(), &mut exploration);
-            let step = actor.step(action, &mut draws);
-            experience.collect(step.reward);
-            let mean = &actor.belief.mean;
-            before = match (step.then, before) {
-                (Then::End, _) => break,
-                (_, None) => None,
-                (Then::Restart, _) => Some(explorer.start(mean, experience)?),
-                (Then::Continue, Some(before)) => {
-                    let event = experience.is_notable(step.reward, settings.notable);
-                    Some(explorer.arrive(mean, before, action, event, experience)?)
-                }
-            };
-        }
+    explore(task, experience, settings.scout, |_, _| Ok(true))?;
+    let coding = Coding::new(task.mdp.model());
+    let mut network = Segmentation::new(task, &coding, vigilance)?;
+    explore(
+        task,
+        experience,
+        settings.explore_limit,
+        |seen, experience| network.take(&seen, experience),
+    )?;
+    let clusters = coding.clusters(network.art.centres());
+    let mut memory = Memory::new(task, clusters.len());
+    if !network.patience.capped {
+        explore(task, experience, settings.explore_limit, |seen, _| {
+            Ok(memory.take(clusters.nearest(seen.mean), seen.action))
+        })?;
     }
+    let (states, recall) = memory.histories.into_automaton(clusters, task.actions());
     Ok(WorldModel {
         vigilance,
-        recall: explorer.coding.recall(explorer.art.centres()),
-        rewarded: explorer.coding.rewarded(explorer.art.centres()),
-        settled: explorer.since >= settings.settle,
-        capped: explorer.capped,
-        growth: explorer.growth,
+        states,
+        recall,
+        rewarded: coding.rewarded(network.art.centres()),
+        founded: network.founded,
+        settled: network.patience.settled() && memory.patience.settled(),
+        capped: network.patience.capped || memory.patience.capped,
     })
 }
 
-/// ART2BeliefSimplexUpdate.
-struct Explorer<'a> {
-    art: Art,
-    coding: Coding<'a>,
-    growth: Vec<u64>,
-    capped: bool,
-    /// Steps since the last new cluster.
-    since: usize,
+/// A belief that was come to.
+struct Seen<'a> {
+    mean: &'a [f64],
+    /// What led to it; `None` where an episode starts.
+    action: Option<ActionId>,
+    reward: f64,
 }
 
-impl Explorer<'_> {
-    /// The cluster of the belief that an episode starts with.
-    fn start(&mut self, mean: &[f64], experience: &Experience) -> Result<usize> {
-        let shown = self.art.present(&self.coding.start(mean))?;
-        Ok(self.take(shown, experience))
-    }
-
-    /// The cluster of a belief that an action led to.
-    fn arrive(
-        &mut self,
-        mean: &[f64],
-        before: usize,
-        action: usize,
-        event: bool,
-        experience: &Experience,
-    ) -> Result<usize> {
-        let before = &self.art.centres()[before];
-        let input = self.coding.arrival(mean, before, action, event);
-        let shown = self.art.present(&input)?;
-        Ok(self.take(shown, experience))
-    }
-
-    fn take(&mut self, shown: Match, experience: &Experience) -> usize {
-        self.since += 1;
-        match shown.outcome {
-            Outcome::Resonated => {}
-            Outcome::Full => self.capped = true,
-            Outcome::Committed => {
-                self.since = 0;
-                self.growth.push(experience.samples);
+/// Acts at random for so many steps or until `take`, which is shown every belief, has seen enough.
+fn explore(
+    task: &Task<'_>,
+    experience: &mut Experience,
+    steps: usize,
+    mut take: impl FnMut(Seen<'_>, &Experience) -> Result<bool>,
+) -> Result<()> {
+    let end = experience.samples + steps as u64;
+    let mut actor = Actor::new(task.worlds, &task.filter);
+    let mut more = true;
+    while more && experience.samples < end {
+        let (mut draws, mut exploration) = experience.next_episode(task.settings.seed);
+        actor.reset(&mut draws);
+        let mut seen = (None, 0.0);
+        for _ in 0..task.mdp.model().episode.length {
+            let (action, reward) = seen;
+            let mean = &actor.belief.mean;
+            more = take(
+                Seen {
+                    mean,
+                    action,
+                    reward,
+                },
+                experience,
+            )?;
+            if !more {
+                break;
             }
+            let action = any_action(task.actions(), &mut exploration);
+            let step = actor.step(action, &mut draws);
+            experience.collect(step.reward);
+            seen = match step.then {
+                Then::Continue => (Some(action), step.reward),
+                Then::Restart => (None, 0.0),
+                Then::End => break,
+            };
         }
-        shown.category
+    }
+    Ok(())
+}
+
+/// Whether anything new has been found of late.
+struct Patience {
+    /// Steps without anything new that are enough.
+    enough: usize,
+    /// Steps since there was anything new.
+    since: usize,
+    /// Whether there was something new that was not allowed.
+    capped: bool,
+}
+
+impl Patience {
+    fn new(enough: usize) -> Self {
+        Self {
+            enough,
+            since: 0,
+            capped: false,
+        }
+    }
+
+    fn settled(&self) -> bool {
+        self.since >= self.enough
+    }
+
+    /// Notes whether something was new, or was not allowed; says whether to go on.
+    fn note(&mut self, new: Option<bool>) -> bool {
+        self.capped |= new.is_none();
+        self.since = if new == Some(true) { 0 } else { self.since + 1 };
+        !self.capped && !self.settled()
+    }
+}
+
+/// ART2BeliefSimplexUpdate.
+struct Segmentation<'a> {
+    art: Art,
+    coding: &'a Coding<'a>,
+    notable: f64,
+    founded: Vec<u64>,
+    patience: Patience,
+}
+
+impl<'a> Segmentation<'a> {
+    fn new(task: &Task<'_>, coding: &'a Coding<'a>, vigilance: f64) -> Result<Self> {
+        let settings = &task.settings;
+        let network = Network {
+            vigilance,
+            rate: settings.rate,
+            rule: Rule::Distance { extent: 1.0 },
+            limit: settings.state_limit,
+        };
+        Ok(Self {
+            art: Art::new(coding.length(), network)?,
+            coding,
+            notable: settings.notable,
+            founded: Vec::new(),
+            patience: Patience::new(settings.settle),
+        })
+    }
+
+    fn take(&mut self, seen: &Seen<'_>, experience: &Experience) -> Result<bool> {
+        let event = experience.is_notable(seen.reward, self.notable);
+        let shown = self.art.present(&self.coding.input(seen.mean, event))?;
+        let new = match shown.outcome {
+            Outcome::Resonated => Some(false),
+            Outcome::Full => None,
+            Outcome::Committed => {
+                self.founded.push(experience.samples);
+                Some(true)
+            }
+        };
+        Ok(self.patience.note(new))
+    }
+}
+
+/// The previous cluster as memory.
+struct Memory {
+    histories: Histories,
+    depth: usize,
+    now: History,
+    patience: Patience,
+}
+
+impl Memory {
+    fn new(task: &Task<'_>, clusters: usize) -> Self {
+        let settings = &task.settings;
+        Self {
+            histories: Histories::new(clusters, settings.depth, settings.state_limit),
+            depth: settings.depth,
+            now: History::start(0),
+            patience: Patience::new(settings.settle),
+        }
+    }
+
+    fn take(&mut self, cluster: usize, action: Option<ActionId>) -> bool {
+        self.now = match action {
+            None => History::start(cluster),
+            Some(action) => self.now.then(action, cluster, self.depth),
+        };
+        let new = self.histories.meet(&self.now);
+        self.patience.note(new)
     }
 }
