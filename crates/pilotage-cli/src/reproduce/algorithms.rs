@@ -41,9 +41,9 @@ const ABOUT: [About; 4] = [
     About {
         name: "ARKAQ",
         needs: "the same, and a vigilance",
-        gives: "an automaton with a node for each cluster",
-        choose: "clusters are wanted without any test, and many nodes do no harm",
-        gap: ("figure-3.11", 0, 0, 2),
+        gives: "an automaton with a node for each cluster and way into it, or a handful of nodes where they are merged",
+        choose: "clusters are wanted without any test, or the hidden thing is told by the last few steps",
+        gap: ("figure-3.11", 0, 0, 4),
         of: "% of what one who is told earns with the hidden load",
     },
 ];

@@ -121,11 +121,10 @@ impl Recall {
     /// The same with some modes put for others: `into` says by mode which one, itself if it stays. Those that stay keep their order.
     pub fn merged(&self, into: &[ModeId]) -> Self {
         let stays = |mode: ModeId| into[mode] == mode;
+        let staying = (0..into.len()).filter(|mode| stays(*mode));
         let mut number = vec![0; into.len()];
-        let mut stayed = 0;
-        for mode in (0..into.len()).filter(|mode| stays(*mode)) {
+        for (stayed, mode) in staying.enumerate() {
             number[mode] = stayed;
-            stayed += 1;
         }
         let renumbered = |mode: &ModeId| number[into[*mode]];
         let rows = self.next.chunks(self.actions * self.clusters.len());

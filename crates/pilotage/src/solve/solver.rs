@@ -60,7 +60,7 @@ impl SolverKind {
             Self::Qmdp => "acts as if all uncertainty were gone after this step",
             Self::Mls => "acts as if the most likely state were certain",
             Self::Kafaq => "learns regions of belief by trial, told neither map nor rewards",
-            Self::Arkaq => "learns clusters of belief by trial, with the one before as memory",
+            Self::Arkaq => "learns clusters of belief by trial, with those before as memory",
         }
     }
 

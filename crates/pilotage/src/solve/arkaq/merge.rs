@@ -5,8 +5,9 @@ use super::draft::{Draft, DraftNode};
 use super::task::Task;
 use crate::solve::learn::{Trial, critical};
 
-/// Pairs tried in a row without success that end it.
+/// Pairs tried in a row without success that end it, and more of them where there are many nodes.
 const TRIES: usize = 12;
+const NODES_PER_TRY: usize = 4;
 
 /// Merges states of a draft; returns the steps that trials took.
 pub(super) fn merge(task: &Task<'_>, draft: &mut Draft) -> u64 {
@@ -20,6 +21,7 @@ pub(super) fn merge(task: &Task<'_>, draft: &mut Draft) -> u64 {
     };
     merging.drop_unused();
     merging.merge_agreeing();
+    merging.drop_unused();
     merging.steps
 }
 
@@ -69,7 +71,7 @@ impl Merging<'_> {
     fn merge_agreeing(&mut self) {
         let mut failed: Vec<[DraftNode; 2]> = Vec::new();
         let mut most = 1;
-        while failed.len() < TRIES {
+        while failed.len() < TRIES + self.draft.nodes.len() / NODES_PER_TRY {
             let pairs = self.nearest_agreeing(&failed, most);
             let Some(&[i, j]) = pairs.first() else { break };
             let mut into: Vec<usize> = (0..self.draft.nodes.len()).collect();
