@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::art::Outcome;
 use crate::belief::{ClusterId, Clusters, Recall};
 use crate::model::{ActionId, ModeId};
 
@@ -86,19 +87,19 @@ impl Histories {
         }
     }
 
-    /// Takes in a history. `Some(true)` if it is new, `None` if it is new and there are too many already; a place is kept for every
-    /// cluster.
-    pub fn meet(&mut self, history: &History) -> Option<bool> {
+    /// Takes in a history, as the network takes in an input: it is known, or it is new, or it is new and there are too many already. A
+    /// place is kept for every cluster.
+    pub fn meet(&mut self, history: &History) -> Outcome {
         if self.number.contains_key(history) {
-            return Some(false);
+            return Outcome::Resonated;
         }
         let empty = self.inside.iter().filter(|states| states.is_empty());
         let kept = empty.count() - usize::from(self.inside[history.cluster].is_empty());
         if self.states.len() + kept >= self.limit {
-            return None;
+            return Outcome::Full;
         }
         self.add(history.clone());
-        Some(true)
+        Outcome::Committed
     }
 
     fn add(&mut self, history: History) {
@@ -167,9 +168,9 @@ mod tests {
             met(0, &[(1, 1), (0, 2)]),
             met(0, &[(0, 1), (0, 2)]),
         ] {
-            assert_eq!(histories.meet(&history), Some(true));
+            assert_eq!(histories.meet(&history), Outcome::Committed);
         }
-        assert_eq!(histories.meet(&met(0, &[])), Some(false));
+        assert_eq!(histories.meet(&met(0, &[])), Outcome::Resonated);
         assert_eq!(histories.like(&met(0, &[(0, 1), (0, 2)])), 3);
         // Agrees in the last step, and in the action before.
         assert_eq!(histories.like(&met(0, &[(1, 1), (0, 0)])), 2);
@@ -177,8 +178,8 @@ mod tests {
         // Agrees in nothing: the first.
         assert_eq!(histories.like(&met(0, &[(2, 2)])), 0);
         // Two places are kept for the other clusters.
-        assert_eq!(histories.meet(&met(0, &[(1, 0)])), None);
-        assert_eq!(histories.meet(&met(1, &[(0, 0)])), Some(true));
-        assert_eq!(histories.meet(&met(1, &[(1, 0)])), None);
+        assert_eq!(histories.meet(&met(0, &[(1, 0)])), Outcome::Full);
+        assert_eq!(histories.meet(&met(1, &[(0, 0)])), Outcome::Committed);
+        assert_eq!(histories.meet(&met(1, &[(1, 0)])), Outcome::Full);
     }
 }

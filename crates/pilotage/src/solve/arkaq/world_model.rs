@@ -167,9 +167,12 @@ impl Patience {
     }
 
     /// Notes whether something was new, or was not allowed; says whether to go on.
-    fn note(&mut self, new: Option<bool>) -> bool {
-        self.capped |= new.is_none();
-        self.since = if new == Some(true) { 0 } else { self.since + 1 };
+    fn note(&mut self, outcome: Outcome) -> bool {
+        match outcome {
+            Outcome::Resonated => self.since += 1,
+            Outcome::Committed => self.since = 0,
+            Outcome::Full => self.capped = true,
+        }
         !self.capped && !self.settled()
     }
 }
@@ -204,15 +207,10 @@ impl<'a> Segmentation<'a> {
     fn take(&mut self, seen: &Seen<'_>, experience: &Experience) -> Result<bool> {
         let event = experience.is_notable(seen.reward, self.notable);
         let shown = self.art.present(&self.coding.input(seen.mean, event))?;
-        let new = match shown.outcome {
-            Outcome::Resonated => Some(false),
-            Outcome::Full => None,
-            Outcome::Committed => {
-                self.founded.push(experience.samples);
-                Some(true)
-            }
-        };
-        Ok(self.patience.note(new))
+        if shown.outcome == Outcome::Committed {
+            self.founded.push(experience.samples);
+        }
+        Ok(self.patience.note(shown.outcome))
     }
 }
 
@@ -240,7 +238,6 @@ impl Memory {
             None => History::start(cluster),
             Some(action) => self.now.then(action, cluster, self.depth),
         };
-        let new = self.histories.meet(&self.now);
-        self.patience.note(new)
+        self.patience.note(self.histories.meet(&self.now))
     }
 }
