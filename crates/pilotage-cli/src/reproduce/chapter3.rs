@@ -129,6 +129,11 @@ fn at(vigilance: f64, seed: u64) -> arkaq::Settings {
     }
 }
 
+fn steps(count: usize) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} step{plural}")
+}
+
 /// As [`at`], remembering more steps and with Q(lambda).
 fn remembering(vigilance: f64, seed: u64) -> arkaq::Settings {
     let arkaq::Settings {
@@ -253,8 +258,8 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
         if let Some(first) = found.first() {
             let automaton = &first.learned.automaton;
             let title = format!(
-                "Vigilance {vigilance}, {} steps remembered, states merged",
-                first.depth
+                "Vigilance {vigilance}, {} remembered, states merged",
+                steps(first.depth)
             );
             draft = draft.automaton(title, automaton)?;
         }
@@ -501,6 +506,7 @@ pub fn figure_6_2(context: &Context<'_>) -> Result<Finding, Failure> {
                 merge,
                 ..learner(vigilance, seed)
             };
+            let depth = settings(1).depth;
             let found = runs(context, &model, &settings)?;
             let of =
                 |value: &dyn Fn(&Run) -> f64| -> Vec<f64> { found.iter().map(value).collect() };
@@ -511,7 +517,10 @@ pub fn figure_6_2(context: &Context<'_>) -> Result<Finding, Failure> {
             }
             rows.push([
                 name.to_owned(),
-                format!("{label}, vigilance {vigilance}"),
+                format!(
+                    "{label}, vigilance {vigilance}, {} remembered",
+                    steps(depth)
+                ),
                 spread(of(&|run| run.learned.automaton.nodes.len() as f64), 0),
                 spread(of(&|run| run.learned.samples as f64 / 1000.0), 0),
                 spread(of(&|run| share(&run.earned)), 1),
