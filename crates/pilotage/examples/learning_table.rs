@@ -127,12 +127,7 @@ impl Table {
         };
         let extended = arkaq::Settings::extended();
         let plain = arkaq::Settings::default();
-        let deep = arkaq::Settings {
-            lambda: extended.lambda,
-            depth: extended.depth,
-            state_limit: extended.state_limit,
-            ..plain.clone()
-        };
+        let deep = arkaq::Settings::remembering();
         let at = |settings: &arkaq::Settings, vigilance: f64| arkaq::Settings {
             vigilances: vec![vigilance],
             ..settings.clone()

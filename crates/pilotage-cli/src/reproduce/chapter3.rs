@@ -129,6 +129,10 @@ fn at(vigilance: f64, seed: u64) -> arkaq::Settings {
     }
 }
 
+fn depth_of(runs: &[Run]) -> usize {
+    runs.first().map_or(0, |run| run.depth)
+}
+
 fn steps(count: usize) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} step{plural}")
@@ -136,17 +140,10 @@ fn steps(count: usize) -> String {
 
 /// As [`at`], remembering more steps and with Q(lambda).
 fn remembering(vigilance: f64, seed: u64) -> arkaq::Settings {
-    let arkaq::Settings {
-        depth,
-        state_limit,
-        lambda,
-        ..
-    } = arkaq::Settings::extended();
     arkaq::Settings {
-        depth,
-        state_limit,
-        lambda,
-        ..at(vigilance, seed)
+        seed,
+        vigilances: vec![vigilance],
+        ..arkaq::Settings::remembering()
     }
 }
 
@@ -212,7 +209,7 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
         let medians = [&of_clusters, &of_nodes, &shares].map(|values| median_of(values.clone()));
         rows.push([
             learner,
-            found.first().map_or(0, |run| run.depth).to_string(),
+            depth_of(found).to_string(),
             spread(of_clusters, 0),
             spread(of_nodes, 0),
             spread(shares, 1),
@@ -416,24 +413,14 @@ pub fn section_3_4_8(context: &Context<'_>) -> Result<Finding, Failure> {
             .filter(|(learned, _)| learned.learning.capped)
             .count();
         all_capped = capped == lives.len();
+        let of =
+            |value: &dyn Fn(&(Learned, f64)) -> f64| spread(lives.iter().map(value).collect(), 0);
         rows.push([
             vigilance.to_string(),
-            spread(
-                lives
-                    .iter()
-                    .map(|(learned, _)| learned.learning.clusters.len() as f64)
-                    .collect(),
-                0,
-            ),
-            spread(
-                lives
-                    .iter()
-                    .map(|(learned, _)| learned.automaton.nodes.len() as f64)
-                    .collect(),
-                0,
-            ),
+            of(&|(learned, _)| learned.learning.clusters.len() as f64),
+            of(&|(learned, _)| learned.automaton.nodes.len() as f64),
             format!("{capped} of {}", lives.len()),
-            spread(lives.iter().map(|(_, life)| *life).collect(), 0),
+            of(&|(_, life)| *life),
         ]);
     }
     Ok(Draft::new(
@@ -506,8 +493,8 @@ pub fn figure_6_2(context: &Context<'_>) -> Result<Finding, Failure> {
                 merge,
                 ..learner(vigilance, seed)
             };
-            let depth = settings(1).depth;
             let found = runs(context, &model, &settings)?;
+            let depth = depth_of(&found);
             let of =
                 |value: &dyn Fn(&Run) -> f64| -> Vec<f64> { found.iter().map(value).collect() };
             if !merge {

@@ -144,11 +144,6 @@ impl Filter {
         self
     }
 
-    /// How it remembers clusters, where its modes are that.
-    pub fn recall(&self) -> Option<&Recall> {
-        self.recall.as_ref()
-    }
-
     /// The belief before anything was observed.
     pub fn initial(&self) -> Belief {
         Belief {

@@ -53,8 +53,7 @@ impl Draft {
             .map(|variable| variable.bounds.width())
             .collect();
         let name = |node: &DraftNode| node.history.name(&automaton.actions);
-        let modes = self.nodes.iter().map(name).collect();
-        automaton.modes = modes;
+        automaton.modes = self.nodes.iter().map(name).collect();
         let levels = 0..=automaton.levels.len() - 1;
         let centres = self.recall.clusters().centres();
         let node = |(id, node): (usize, &DraftNode)| {

@@ -108,6 +108,11 @@ impl Histories {
         self.states.push(history);
     }
 
+    /// What is remembered of a history after an action that led to a cluster.
+    pub fn after(&self, history: &History, action: ActionId, cluster: ClusterId) -> History {
+        history.then(action, cluster, self.depth)
+    }
+
     /// The automaton's states and how they follow one another.
     pub fn into_automaton(mut self, clusters: Clusters, actions: usize) -> (Vec<History>, Recall) {
         for cluster in 0..clusters.len() {
@@ -121,7 +126,7 @@ impl Histories {
         for history in &self.states {
             for action in 0..actions {
                 for cluster in 0..clusters.len() {
-                    next.push(self.like(&history.then(action, cluster, self.depth)));
+                    next.push(self.like(&self.after(history, action, cluster)));
                 }
             }
         }

@@ -51,31 +51,33 @@ impl Merging<'_> {
 
     /// States that the policy never comes to are of no use to it: the nearest one that it comes to takes their place.
     fn drop_unused(&mut self) {
-        let used: Vec<usize> = (0..self.visits.len())
-            .filter(|id| self.visits[*id] > 0.0)
-            .collect();
+        let is_used = |id: &usize| self.visits[*id] > 0.0;
         let nearest = |id: usize| {
-            let used = used.iter().copied();
-            used.min_by(|a, b| {
-                self.draft
-                    .apart(id, *a)
-                    .total_cmp(&self.draft.apart(id, *b))
-            })
+            let apart = |other: &usize| self.draft.apart(id, *other);
+            let used = (0..self.visits.len()).filter(is_used);
+            used.min_by(|a, b| apart(a).total_cmp(&apart(b)))
         };
-        let into = (0..self.visits.len()).map(|id| nearest(id).unwrap_or(id));
+        let into = (0..self.visits.len()).map(|id| match is_used(&id) {
+            true => id,
+            false => nearest(id).unwrap_or(id),
+        });
         let smaller = self.draft.merged(&into.collect::<Vec<_>>());
         self.accept(smaller);
     }
 
     /// Merges more pairs at a time as long as that succeeds, fewer when it does not.
     fn merge_agreeing(&mut self) {
-        let mut failed: Vec<[DraftNode; 2]> = Vec::new();
+        let mut pairs = self.agreeing();
+        // The first so many of them did not merge.
+        let mut failed = 0;
         let mut most = 1;
-        while failed.len() < TRIES + self.draft.nodes.len() / NODES_PER_TRY {
-            let pairs = self.nearest_agreeing(&failed, most);
-            let Some(&[i, j]) = pairs.first() else { break };
+        while failed < TRIES + self.draft.nodes.len() / NODES_PER_TRY {
+            let chosen = disjoint(&pairs[failed..], self.draft.nodes.len(), most);
+            if chosen.is_empty() {
+                break;
+            }
             let mut into: Vec<usize> = (0..self.draft.nodes.len()).collect();
-            for &[i, j] in &pairs {
+            for &[i, j] in &chosen {
                 // The state that is visited more stands for both.
                 let (kept, gone) = if self.visits[i] >= self.visits[j] {
                     (i, j)
@@ -84,20 +86,20 @@ impl Merging<'_> {
                 };
                 into[gone] = kept;
             }
-            let pair = [i, j].map(|id| self.draft.nodes[id].clone());
             if self.accept(self.draft.merged(&into)) {
-                failed.clear();
+                pairs = self.agreeing();
+                failed = 0;
                 most *= 2;
-            } else if pairs.len() == 1 {
-                failed.push(pair);
+            } else if chosen.len() == 1 {
+                failed += 1;
             } else {
-                most = pairs.len() / 2;
+                most = chosen.len() / 2;
             }
         }
     }
 
-    /// The nearest pairs of nodes that agree and have not failed to merge, at most so many and no node in two of them.
-    fn nearest_agreeing(&self, failed: &[[DraftNode; 2]], most: usize) -> Vec<[usize; 2]> {
+    /// The pairs of nodes that agree, the nearest first.
+    fn agreeing(&self) -> Vec<[usize; 2]> {
         let nodes = &self.draft.nodes;
         let values = nodes.iter().map(|node| node.value);
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |range, value| {
@@ -107,21 +109,25 @@ impl Merging<'_> {
         let agree = |a: &DraftNode, b: &DraftNode| {
             a.action == b.action && (a.value - b.value).abs() <= reach
         };
-        let tried = |a: &DraftNode, b: &DraftNode| failed.iter().any(|[c, d]| c == a && d == b);
         let pairs = (0..nodes.len()).flat_map(|j| (0..j).map(move |i| [i, j]));
         let mut pairs: Vec<([usize; 2], f64)> = pairs
-            .filter(|&[i, j]| agree(&nodes[i], &nodes[j]) && !tried(&nodes[i], &nodes[j]))
+            .filter(|&[i, j]| agree(&nodes[i], &nodes[j]))
             .map(|[i, j]| ([i, j], self.draft.apart(i, j)))
             .collect();
         pairs.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let mut free = vec![true; nodes.len()];
-        let mut chosen = Vec::new();
-        for ([i, j], _) in pairs {
-            if chosen.len() < most && free[i] && free[j] {
-                (free[i], free[j]) = (false, false);
-                chosen.push([i, j]);
-            }
-        }
-        chosen
+        pairs.into_iter().map(|(pair, _)| pair).collect()
     }
+}
+
+/// The first pairs of so many nodes, at most `most`, with no node in two of them.
+fn disjoint(pairs: &[[usize; 2]], nodes: usize, most: usize) -> Vec<[usize; 2]> {
+    let mut free = vec![true; nodes];
+    let apart = pairs.iter().copied().filter(|&[i, j]| {
+        let both = free[i] && free[j];
+        if both {
+            (free[i], free[j]) = (false, false);
+        }
+        both
+    });
+    apart.take(most).collect()
 }

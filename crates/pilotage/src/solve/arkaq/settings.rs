@@ -109,10 +109,17 @@ impl Settings {
     pub fn extended() -> Self {
         Self {
             vigilances: vec![0.1, 0.3, 0.5, 0.7, 0.8],
+            merge: true,
+            ..Self::remembering()
+        }
+    }
+
+    /// ARKAQ with a memory of three steps, room for the states that takes, and Q(lambda).
+    pub fn remembering() -> Self {
+        Self {
             lambda: 0.9,
             depth: 3,
             state_limit: 1_000,
-            merge: true,
             ..Self::default()
         }
     }

@@ -217,7 +217,6 @@ impl<'a> Segmentation<'a> {
 /// The previous cluster as memory.
 struct Memory {
     histories: Histories,
-    depth: usize,
     now: History,
     patience: Patience,
 }
@@ -227,7 +226,6 @@ impl Memory {
         let settings = &task.settings;
         Self {
             histories: Histories::new(clusters, settings.depth, settings.state_limit),
-            depth: settings.depth,
             now: History::start(0),
             patience: Patience::new(settings.settle),
         }
@@ -236,7 +234,7 @@ impl Memory {
     fn take(&mut self, cluster: usize, action: Option<ActionId>) -> bool {
         self.now = match action {
             None => History::start(cluster),
-            Some(action) => self.now.then(action, cluster, self.depth),
+            Some(action) => self.histories.after(&self.now, action, cluster),
         };
         self.patience.note(self.histories.meet(&self.now))
     }
