@@ -107,14 +107,7 @@ fn failures(mdp: &BeliefMdp, grid: &Grid) -> Vec<Vec<f64>> {
 /// Levels that lead back to each other, in an order such that every group only leads to itself and those before it.
 fn groups_of_levels(mdp: &BeliefMdp) -> Vec<Vec<LevelId>> {
     let levels = mdp.levels();
-    if (0..mdp.model().actions.len())
-        .any(|action| mdp.model().actions[action].then == Then::Restart)
-        || mdp
-            .model()
-            .events
-            .iter()
-            .any(|event| event.then == Then::Restart)
-    {
+    if mdp.model().restarts() {
         return vec![(0..levels.len()).rev().collect()];
     }
     let classes = levels.classes().len();
@@ -240,19 +233,7 @@ impl GridPolicy {
 
     /// Whether no action comes back to the level, nor to the start.
     fn leaves_itself(&self, level: LevelId) -> bool {
-        let restarts = self
-            .mdp
-            .model()
-            .actions
-            .iter()
-            .any(|action| action.then == Then::Restart)
-            || self
-                .mdp
-                .model()
-                .events
-                .iter()
-                .any(|event| event.then == Then::Restart);
-        !restarts
+        !self.mdp.model().restarts()
             && (0..self.mdp.levels().classes().len())
                 .all(|class| self.mdp.levels().step(level, class).next != level)
     }
@@ -315,7 +296,7 @@ impl GridPolicy {
     }
 
     fn backup_entry(&self, mode: usize, level: LevelId, mean: &[f64], action: ActionId) -> Entry {
-        let outcomes = self.mdp.outcomes(mode, level, mean, action);
+        let (reward, outcomes) = self.mdp.step(mode, level, mean, action);
         let restart = outcomes
             .iter()
             .filter(|outcome| outcome.then == Then::Restart)
@@ -341,7 +322,7 @@ impl GridPolicy {
                 .collect()
         };
         Entry {
-            reward: self.mdp.reward(mode, level, mean, action),
+            reward,
             restart,
             next,
             centres,

@@ -116,7 +116,6 @@ pub fn generate(
     })
 }
 
-/// The branches' formulas are for rewards `r(s, a)`.
 /// Whether the number of nodes has stayed the same over the last `repeats` horizons.
 fn settled(history: &[(usize, usize)], repeats: usize) -> bool {
     history.len() > repeats
