@@ -123,7 +123,7 @@ pub fn baseline(context: &Context<'_>, model: &Model) -> Result<Evaluation> {
     let first = all.into_iter().next();
     first
         .map(|one| one.earned)
-        .ok_or_else(|| Error::Missing(format!("{} has no yardstick", model.name)))
+        .ok_or_else(|| Error::Missing(format!("{} has no baseline", model.name)))
 }
 
 fn reproduced(context: &Context<'_>, problem_: &Problem) -> Result<Finding> {
