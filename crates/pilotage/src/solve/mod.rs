@@ -19,7 +19,6 @@ mod run;
 mod solution;
 mod solver;
 pub mod walled;
-pub mod yardstick;
 
 pub use run::{SolveSettings, solve};
 pub use solution::{Form, Learning, Solution, Solved};
