@@ -5,14 +5,15 @@ use std::collections::BTreeSet;
 use super::svg::text_width;
 use super::*;
 use pilotage::belief::{Belief, BeliefMdp};
-use pilotage::model::{self, ActionId};
+use pilotage::model::ActionId;
 use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Matching, Node, Place, Policy};
+use pilotage::scenario;
 use pilotage::solve::compile;
 use pilotage::solve::kbvi::closed;
 
 fn mdp(name: &str) -> BeliefMdp {
-    BeliefMdp::new(&model::find(name).expect("a built-in model"))
+    BeliefMdp::new(&scenario::find(name).expect("a built-in model").model)
 }
 
 fn solved(name: &str, matching: Matching) -> (BeliefMdp, closed::GridPolicy, Automaton) {

@@ -1,9 +1,10 @@
 //! What experiments share: settings of the run, short cuts to solving and measuring, and the making of a finding.
 
 use pilotage::belief::BeliefMdp;
-use pilotage::model::{self, Model};
+use pilotage::model::Model;
 use pilotage::observe::Observer;
 use pilotage::policy::Automaton;
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options};
 use pilotage::solve::{Solution, SolveSettings, SolverKind, solve};
 use pilotage_report::{
@@ -38,28 +39,28 @@ impl Context<'_> {
     pub(crate) fn solved(
         &self,
         solver: SolverKind,
-        model: &Model,
+        scenario: &Scenario,
         settings: SolveSettings,
     ) -> Result<Solution> {
         let settings = SolveSettings {
             seed: self.seed,
             ..settings
         };
-        Ok(solve(solver, model, &settings, self.observer)?)
+        Ok(solve(solver, scenario, &settings, self.observer)?)
     }
 
     /// The default planner's automaton, which is the baseline.
-    pub(crate) fn planned(&self, model: &Model) -> Result<Solution> {
-        self.solved(SolverKind::KbviClosed, model, SolveSettings::default())
+    pub(crate) fn planned(&self, scenario: &Scenario) -> Result<Solution> {
+        self.solved(SolverKind::KbviClosed, scenario, SolveSettings::default())
     }
 
-    pub(crate) fn earned(&self, model: &Model, solution: &Solution) -> Evaluation {
-        solution.evaluate(model, self.options(), self.observer)
+    pub(crate) fn earned(&self, scenario: &Scenario, solution: &Solution) -> Result<Evaluation> {
+        Ok(solution.evaluate(scenario, self.options(), self.observer)?)
     }
 }
 
-pub fn problem(name: &str) -> Result<Model> {
-    Ok(model::find(name)?)
+pub fn problem(name: &str) -> Result<Scenario> {
+    Ok(scenario::find(name)?)
 }
 
 /// The automaton of a solution in the default form.

@@ -1,9 +1,9 @@
 //! The episodes that open the report.
 
 use pilotage::belief::BeliefMdp;
-use pilotage::model;
 use pilotage::observe::Observer;
 use pilotage::policy::{Automaton, Matching};
+use pilotage::scenario;
 use pilotage::solve::{SolveSettings, SolverKind, solve};
 use pilotage_report::{Recording, Take, record};
 
@@ -36,14 +36,14 @@ pub fn episodes(seed: u64, observer: &dyn Observer) -> Result<Vec<Recording>> {
         ),
     ];
     let recordings = shown.map(|(name, most_steps, title, about)| {
-        let model = model::find(name)?;
+        let scenario = scenario::find(name)?;
         let solution = solve(
             SolverKind::KbviClosed,
-            &model,
+            &scenario,
             &SolveSettings::default(),
             observer,
         )?;
-        let mdp = BeliefMdp::new(&model);
+        let mdp = BeliefMdp::new(&scenario.model);
         let empty = Automaton::new(&mdp, "", Matching::Nearest);
         let automaton = solution.automaton().unwrap_or(&empty);
         let take = Take {
@@ -54,7 +54,7 @@ pub fn episodes(seed: u64, observer: &dyn Observer) -> Result<Vec<Recording>> {
         Ok(Recording {
             title: title.to_owned(),
             about: about.to_owned(),
-            ..record(&mdp, automaton, take)?
+            ..record(&mdp, &scenario.truth, automaton, take)?
         })
     });
     recordings.into_iter().collect()
