@@ -5,7 +5,7 @@ use super::{Model, ModelError, load, read};
 
 macro_rules! models {
     ($($name:literal),* $(,)?) => {
-        &[$(($name, include_str!(concat!("../../../../models/", $name, ".toml")))),*]
+        &[$(($name, include_str!(concat!("../../models/", $name, ".toml")))),*]
     };
 }
 
