@@ -39,6 +39,7 @@ pub mod policy;
 pub mod random;
 #[cfg(feature = "report")]
 pub mod report;
+pub mod scenario;
 pub mod simulate;
 pub mod solve;
 pub mod world;

@@ -6,8 +6,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::model::{Model, Robot};
+use crate::model::Model;
 use crate::random::{Rng, normal};
+use crate::scenario::Robot;
 
 /// How fast a deviation of the heading is turned back, per second.
 const GAIN: f64 = 4.0;
