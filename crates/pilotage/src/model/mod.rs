@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use barriers::Barriers;
-pub use error::{Fault, ModelError, Path, Place, Step, suggest};
+pub use error::{Fault, ModelError, Path, Place, Step, nearest, suggest};
 pub use map::Map;
 pub use region::{Interval, Region};
 

@@ -21,6 +21,7 @@ mod solver;
 pub mod walled;
 pub mod yardstick;
 
+pub use learn::SettingInfo;
 pub use run::{SolveSettings, solve};
 pub use solution::{Form, Learning, Solution, Solved};
 pub use solver::SolverKind;
