@@ -208,15 +208,14 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
-    use crate::model::{WorldKind, find};
     use crate::random::{Role, stream};
+    use crate::scenario::{Scenario, Simulator, find};
 
     fn arena(change: impl Fn(&mut Robot)) -> RobotArena {
-        let model = find("robot-maze-4x4").unwrap();
-        let WorldKind::Robot(robot) = &model.world.kind else {
+        let Scenario { model, truth } = find("robot-maze-4x4").unwrap();
+        let Simulator::Robot(mut robot) = truth.simulator else {
             panic!("no robot");
         };
-        let mut robot = robot.clone();
         (robot.slip, robot.compass_noise, robot.range_noise) = (0.0, 0.0, 0.0);
         change(&mut robot);
         RobotArena::new(&robot, &model)
