@@ -178,7 +178,7 @@ fn spoilt(folder: &Path, right: &str, wrong: &str) -> String {
 }
 
 fn pilotage_model(file: &str) -> String {
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../pilotage/models");
     fs::read_to_string(models.join(file)).unwrap()
 }
 

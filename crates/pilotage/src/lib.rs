@@ -45,5 +45,5 @@ pub mod world;
 pub use error::{Error, Result};
 
 #[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
+#[doc = include_str!("../README.md")]
 struct Readme;

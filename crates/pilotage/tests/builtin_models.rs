@@ -30,7 +30,7 @@ fn every_built_in_model_reads_under_its_own_name() {
 
 #[test]
 fn every_model_file_of_the_workspace_is_built_in() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models");
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/models");
     let mut files: Vec<String> = std::fs::read_dir(folder)
         .unwrap()
         .filter_map(|entry| {

@@ -11,7 +11,7 @@ const UPDATE: &str = "PILOTAGE_UPDATE_SCHEMA";
 
 #[test]
 fn the_committed_schema_is_current() {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../models/model.schema.json");
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("models/model.schema.json");
     let current = scenario::schema();
     if std::env::var_os(UPDATE).is_some() {
         std::fs::write(

@@ -114,15 +114,11 @@ impl Fault {
     }
 }
 
-/// A hint towards the known name that is nearest to `name`, or a list of all known ones.
-pub fn suggest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
-    let known: Vec<&str> = known
-        .into_iter()
-        .filter(|known| !known.is_empty())
-        .collect();
+/// The known name that is nearest to `name`, if one is near enough to have been meant.
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let folded = name.to_lowercase();
-    let nearest = known
-        .iter()
+    known
+        .into_iter()
         .map(|known| {
             (
                 strsim::damerau_levenshtein(&folded, &known.to_lowercase()),
@@ -130,9 +126,18 @@ pub fn suggest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Stri
             )
         })
         .filter(|(distance, known)| *distance <= 1 + known.chars().count() / 3)
-        .min_by_key(|(distance, _)| *distance);
-    match nearest {
-        Some((_, nearest)) => format!("did you mean `{nearest}`?"),
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, nearest)| nearest)
+}
+
+/// A hint towards the known name that is nearest to `name`, or a list of all known ones.
+pub fn suggest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known
+        .into_iter()
+        .filter(|known| !known.is_empty())
+        .collect();
+    match nearest(name, known.iter().copied()) {
+        Some(nearest) => format!("did you mean `{nearest}`?"),
         None if known.is_empty() => "none is declared in this file".to_owned(),
         None => format!("known here: `{}`", known.join("`, `")),
     }

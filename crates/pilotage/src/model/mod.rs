@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 pub use barriers::Barriers;
 pub use effects::{Change, Effect, Outcome, Tally, apart};
-pub use error::{Fault, ModelError, Path, Place, Step, suggest};
+pub use error::{Fault, ModelError, Path, Place, Step, nearest, suggest};
 pub use map::Map;
 pub use region::{Interval, Region};
 

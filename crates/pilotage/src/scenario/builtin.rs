@@ -5,7 +5,7 @@ use crate::model::{ModelError, suggest};
 
 macro_rules! models {
     ($($name:literal),* $(,)?) => {
-        &[$(($name, include_str!(concat!("../../../../models/", $name, ".toml")))),*]
+        &[$(($name, include_str!(concat!("../../models/", $name, ".toml")))),*]
     };
 }
 

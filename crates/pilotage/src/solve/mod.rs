@@ -20,6 +20,7 @@ mod solution;
 mod solver;
 pub mod walled;
 
+pub use learn::SettingInfo;
 pub use run::{SolveSettings, solve};
 pub use solution::{Form, Learning, Solution, Solved};
 pub use solver::SolverKind;

@@ -1,16 +1,17 @@
 //! What a learning run can be told.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::solve::learn::{Rates, ensure, set};
+use crate::solve::learn::{Rates, SettingInfo, described, ensure, set};
 
 /// Largest [`Settings::depth`].
 const MOST_DEPTH: usize = 16;
 
 /// Settings of ARKAQ-learning. Lengths are shares of the world, rewards shares of the range of the rewards that were met, so that the
 /// defaults do not depend on a problem's units.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Settings {
     /// Seed of every random number.
     pub seed: u64,
@@ -23,7 +24,7 @@ pub struct Settings {
     pub depth: usize,
     /// A reward of this share of the largest one met sets a cluster apart while the world is explored; in `(0, 1]`.
     pub notable: f64,
-    /// Steps that find out how large rewards are before clusters are made.
+    /// Steps that find out how large rewards are before clusters are made; at least 0.
     pub scout: usize,
     /// Steps without a new cluster, then without a new state, that end the exploration; at least 1.
     pub settle: usize,
@@ -55,7 +56,7 @@ pub struct Settings {
     pub still: f64,
     /// Calm epochs in a row that mean convergence; at least 1.
     pub calm: usize,
-    /// Whether states that agree in action and value are merged.
+    /// Whether states that agree in action and value are merged: `true` or `false`.
     pub merge: bool,
     /// Values agree that differ by at most this share of the range of values; in `[0, 1]`.
     pub agree: f64,
@@ -104,6 +105,11 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// All of them but the seed, which a run sets: by name, with defaults and what they mean.
+    pub fn described() -> Vec<SettingInfo> {
+        described::<Self>()
+    }
+
     /// ARKAQ with what the thesis left to be done (chapter 7): vigilance that tunes itself, states that merge, and Q(lambda); and with a
     /// memory that reaches farther back than one cluster.
     pub fn extended() -> Self {

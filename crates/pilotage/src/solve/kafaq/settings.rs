@@ -1,12 +1,13 @@
 //! What a learning run can be told.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::solve::learn::{Rates, ensure, set};
+use crate::solve::learn::{Rates, SettingInfo, described, ensure, set};
 
 /// How regions change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Rules {
     /// On the evidence of many visits, by tests with stated error rates.
@@ -18,11 +19,11 @@ pub enum Rules {
 
 /// Settings of KAFAQ-learning. Lengths are measured in standard deviations of the steady level, rewards by the range of the
 /// rewards that were met, so that the defaults do not depend on a problem's units.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Settings {
     /// Seed of every random number.
     pub seed: u64,
-    /// How regions change.
+    /// How regions change: `tested`, on evidence, or `printed`, at every step as in Figure 4.5.
     pub rules: Rules,
     /// Side of a neighbourhood of the lattice that collects evidence, in `sqrt(P)` of the steady level; more than 0, at most 10.
     pub cell: f64,
@@ -124,6 +125,11 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// All of them but the seed, which a run sets: by name, with defaults and what they mean.
+    pub fn described() -> Vec<SettingInfo> {
+        described::<Self>()
+    }
+
     /// Sets one of them by name to a value written as in JSON; words need no quotes. Ranges are left to [`Settings::validate`].
     ///
     /// # Errors

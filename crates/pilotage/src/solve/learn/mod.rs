@@ -9,7 +9,8 @@ mod table;
 mod trial;
 
 pub(super) use actor::{Actor, known};
-pub(super) use ensure::{ensure, set};
+pub use ensure::SettingInfo;
+pub(super) use ensure::{described, ensure, set};
 pub(super) use experience::Experience;
 pub(super) use table::{Rates, Table, Transition, any_action, boltzmann};
 pub(super) use trial::{Trial, critical, discounted, run_trial, undiscounted};
