@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::filter::{Belief, Filter};
-use super::gaussian::region_probability;
+use super::gaussian::{interval_probability, region_probability};
 use super::levels::{LevelGraph, LevelId};
 use super::mixture::Mixture;
 use crate::model::{
@@ -184,15 +184,9 @@ impl BeliefMdp {
 
     /// As [`BeliefMdp::probability`], for a region as the belief reads it.
     fn mass(&self, level: LevelId, mean: &[f64], region: &Region) -> f64 {
-        match self.read_as_mixture() {
-            None => region_probability(mean, self.levels.covariance(level), region),
-            Some(mixture) => {
-                let covariance = mixture.covariance(level);
-                let hypotheses = mixture.hypotheses(level, mean);
-                let mass = |x: &DVector<f64>| region_probability(x.as_slice(), covariance, region);
-                hypotheses.iter().map(|(weight, x)| weight * mass(x)).sum()
-            }
-        }
+        self.averaged(level, mean, |mean, covariance| {
+            region_probability(mean, covariance, region)
+        })
     }
 
     /// Probability that the true state lies in the region when the step asks for it. After the move it lies where the filter
@@ -224,13 +218,24 @@ impl BeliefMdp {
         self.stop(mean, moved)
     }
 
-    /// Probability that the true state has left what [`crate::model::Episode::alive`] allows.
-    pub fn failure(&self, level: LevelId, mean: &[f64]) -> f64 {
+    /// Probability that the true state leaves what [`crate::model::Episode::alive`] allows in the step that an action takes, of an agent
+    /// that has not failed: now the state is within all limits, and the filter does not know it.
+    ///
+    /// Counting the probability of being outside afresh at every step would count the same error of the estimate over and over.
+    pub fn failure(&self, level: LevelId, mean: &[f64], action: ActionId) -> f64 {
         let alive = &self.model.episode.alive;
-        if alive.sides.is_empty() {
+        if alive.sides.is_empty() || self.model.actions[action].then != Then::Continue {
             return 0.0;
         }
-        (1.0 - self.probability(level, mean, alive)).max(0.0)
+        let (a, covariance) = (&self.model.motion.a, self.levels.covariance(level));
+        let step = self.levels.step(level, self.levels.class_of(action));
+        let predicted = self.predicted(mean, action);
+        let carried = a * covariance;
+        let stays = alive.sides.iter().map(|&(i, side)| {
+            let later = (predicted[i], step.correction.predicted[(i, i)]);
+            stays((mean[i], covariance[(i, i)]), later, carried[(i, i)], side)
+        });
+        1.0 - stays.product::<f64>()
     }
 
     /// Expected immediate reward `r(b, a)`, events included, and what the action can do to mode and episode. The reward of failing is
@@ -260,7 +265,44 @@ impl BeliefMdp {
             }
         }
         add(tally.rest());
-        (tally.reward, outcomes)
+        (
+            tally.reward + self.running_cost(level, mean, action),
+            outcomes,
+        )
+    }
+
+    /// Expected cost of a step, as a negative reward.
+    fn running_cost(&self, level: LevelId, mean: &[f64], action: ActionId) -> f64 {
+        self.averaged(level, mean, |mean, covariance| {
+            self.model.running_cost(mean, Some(covariance), action)
+        })
+    }
+
+    /// Expected cost of ending an episode, as a negative reward.
+    pub fn terminal_cost(&self, level: LevelId, mean: &[f64]) -> f64 {
+        self.averaged(level, mean, |mean, covariance| {
+            self.model.terminal_cost(mean, Some(covariance))
+        })
+    }
+
+    /// Average of something that is known of a Gaussian.
+    fn averaged(
+        &self,
+        level: LevelId,
+        mean: &[f64],
+        of: impl Fn(&[f64], &DMatrix<f64>) -> f64,
+    ) -> f64 {
+        match self.read_as_mixture() {
+            None => of(mean, self.levels.covariance(level)),
+            Some(mixture) => {
+                let covariance = mixture.covariance(level);
+                let hypotheses = mixture.hypotheses(level, mean);
+                hypotheses
+                    .iter()
+                    .map(|(weight, x)| weight * of(x.as_slice(), covariance))
+                    .sum()
+            }
+        }
     }
 
     /// Expected immediate reward `r(b, a)`, see [`BeliefMdp::step`].
@@ -389,4 +431,31 @@ fn moments(model: &Model) -> (DVector<f64>, DMatrix<f64>) {
         sum + (&start.covariance + &apart * apart.transpose()) * start.weight
     });
     (mean, covariance)
+}
+
+/// Probability that a variable is within limits a step later, given that it is now. Mean and variance now and later, and the covariance
+/// of the two.
+fn stays(now: (f64, f64), later: (f64, f64), shared: f64, side: Interval) -> f64 {
+    // So many standard deviations inside its limits a variable leaves them less often than once in 1e11 steps.
+    const NEVER: f64 = 6.7;
+    // Less likely than this an agent is not there to ask.
+    const HARDLY: f64 = 1e-9;
+    let inside = |(mean, variance): (f64, f64)| {
+        let reach = NEVER * f64::sqrt(variance);
+        mean - side.low > reach && side.high - mean > reach
+    };
+    if inside(later) {
+        return 1.0;
+    }
+    let alive = interval_probability(now.0, now.1, side);
+    if alive < HARDLY {
+        return 0.0;
+    }
+    let joint = DMatrix::from_row_slice(2, 2, &[now.1, shared, shared, later.1]);
+    let both = region_probability(
+        &[now.0, later.0],
+        &joint,
+        &Region::new(vec![(0, side), (1, side)]),
+    );
+    (both / alive).clamp(0.0, 1.0)
 }

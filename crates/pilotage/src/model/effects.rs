@@ -5,6 +5,8 @@
 //! plain rewards add up, and of those that change something (events) the first happens and no other. What the action itself does to the
 //! episode comes before what an event does; a step that ends or restarts the episode does not move.
 
+use nalgebra::DMatrix;
+
 use super::{ActionId, Event, ModeId, Model, Region, Then, When};
 
 /// One thing that a step can do. Whoever knows how likely its region holds knows the rest ([`Tally`]).
@@ -71,6 +73,26 @@ impl Model {
         paid.chain(happening).collect()
     }
 
+    /// What the [`QuadraticCost`](super::QuadraticCost) pays, 0 or less, for an action in a state whose mean is `mean` (length `n`) and
+    /// whose covariance, if it is not known, is `covariance` (`n x n`): `-(m' Q m + tr(Q P) + u' R u)`.
+    pub fn running_cost(
+        &self,
+        mean: &[f64],
+        covariance: Option<&DMatrix<f64>>,
+        action: ActionId,
+    ) -> f64 {
+        self.cost.as_ref().map_or(0.0, |cost| {
+            let control = self.actions[action].control.as_slice();
+            -(quadratic(&cost.state, mean, covariance) + quadratic(&cost.control, control, None))
+        })
+    }
+
+    /// The same for a state in which an episode ends.
+    pub fn terminal_cost(&self, mean: &[f64], covariance: Option<&DMatrix<f64>>) -> f64 {
+        let terminal = self.cost.as_ref();
+        terminal.map_or(0.0, |cost| -quadratic(&cost.terminal, mean, covariance))
+    }
+
     /// The account of a step that has not happened yet.
     pub fn tally(&self, mode: ModeId, action: ActionId) -> Tally {
         Tally {
@@ -94,6 +116,17 @@ impl Model {
         let mut ends = ends.chain(self.events.iter().map(|event| event.then));
         ends.any(|then| then == Then::Restart)
     }
+}
+
+/// `E x' W x` of a vector with that mean and covariance.
+fn quadratic(weights: &DMatrix<f64>, mean: &[f64], covariance: Option<&DMatrix<f64>>) -> f64 {
+    let n = mean.len();
+    let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let of = |(i, j)| {
+        let spread = covariance.map_or(0.0, |covariance| covariance[(i, j)]);
+        weights[(i, j)] * (mean[i] * mean[j] + spread)
+    };
+    pairs.map(of).sum()
 }
 
 /// Splits the regions of events so that no two of the same time overlap: each is left with what comes to it first. Then the

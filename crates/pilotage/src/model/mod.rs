@@ -56,7 +56,7 @@ pub struct Model {
     pub rewards: Vec<Reward>,
     /// Events that change the hidden mode. The first that applies happens, at most one a step.
     pub events: Vec<Event>,
-    /// Quadratic cost of state and control, for `lqg`.
+    /// Quadratic cost of state and control.
     pub cost: Option<QuadraticCost>,
     /// Length and failure limits of an episode.
     pub episode: Episode,
@@ -233,7 +233,8 @@ pub struct Event {
     pub then: Then,
 }
 
-/// `cost = s' state s + u' control u` a step, `s' terminal s` at the end.
+/// `cost = s' state s + u' control u` a step, `s' terminal s` at the end of the episode. A cost is a negative reward, paid beside
+/// all others when the action is taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuadraticCost {
     /// State weights, `n x n`.
@@ -360,12 +361,6 @@ impl Model {
             .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
                 (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
             })
-    }
-
-    /// The model with another belief about walls.
-    pub fn with_walls(mut self, walls: WallBelief) -> Self {
-        self.belief.walls = walls;
-        self
     }
 
     /// Where something good is paid: the regions of all rewards and events above 0.

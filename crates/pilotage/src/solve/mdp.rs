@@ -11,12 +11,12 @@ use nalgebra::DVector;
 
 pub use super::grid::Settings;
 use super::grid::{Axis, Grid, Interpolation, Smoother};
-use super::kbvi::branches::first_best;
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
 use crate::model::{ActionId, HypothesisBelief, ModeId, Model, Outcome, Then, WallBelief};
 use crate::observe::Observer;
 use crate::parallel;
+use crate::policy::first_best;
 
 /// Most state variables for which a grid of true states is fine enough to be of use.
 pub const MOST_VARIABLES: usize = 3;
@@ -278,7 +278,8 @@ impl StateMdp {
 fn seen(model: &Model, mode: ModeId, state: &[f64], action: ActionId) -> (f64, Outcome) {
     let mut tally = model.tally(mode, action);
     let happened = tally.see(&model.effects(mode, action, 0), state);
-    (tally.reward, happened.unwrap_or_else(|| tally.rest()))
+    let reward = tally.reward + model.running_cost(state, None, action);
+    (reward, happened.unwrap_or_else(|| tally.rest()))
 }
 
 fn check(settings: &Settings) -> Result<()> {

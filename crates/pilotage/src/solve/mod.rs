@@ -12,6 +12,7 @@ pub mod lqg;
 pub mod lqr;
 pub mod mdp;
 pub mod mls;
+mod promise;
 pub mod qmdp;
 pub mod refine;
 pub mod rollout;
@@ -21,6 +22,7 @@ mod solver;
 pub mod walled;
 
 pub use learn::SettingInfo;
+pub use promise::Earned;
 pub use run::{SolveSettings, solve};
 pub use solution::{Form, Learning, Solution, Solved};
 pub use solver::SolverKind;

@@ -121,8 +121,12 @@ impl SolverKind {
 
 /// Those that maximise reward need some, discounted.
 fn reward_missing(model: &Model) -> Option<String> {
-    if model.rewards.is_empty() && model.events.is_empty() && model.episode.failure_reward == 0.0 {
-        return Some("nothing in it pays a reward; add a [[reward]]".to_owned());
+    let pays = !model.rewards.is_empty()
+        || !model.events.is_empty()
+        || model.episode.failure_reward != 0.0
+        || model.cost.is_some();
+    if !pays {
+        return Some("nothing in it pays a reward; add a [[reward]] or a [cost]".to_owned());
     }
     (model.discount >= 1.0).then(|| {
         "its discount is 1, and a sum without end needs one below 1; set `discount` to 0.99 or less"

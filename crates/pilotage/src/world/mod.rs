@@ -26,6 +26,11 @@ pub trait World: Send {
     /// `observation`. Nothing is sensed when the episode ends or restarts.
     fn step(&mut self, action: ActionId, draws: &mut Draws, observation: &mut [f64]) -> Step;
 
+    /// What is paid besides in the current state because an episode ends there, in units of reward.
+    fn ending(&self) -> f64 {
+        0.0
+    }
+
     /// The true state, for drawings and for agents that are told it.
     fn state(&self) -> &[f64];
 

@@ -12,6 +12,9 @@ use crate::model::{
 use crate::random::uniform;
 use crate::scenario::{Scenario, Simulator, Walls};
 
+/// Times that a start within the limits of the episode is drawn for; what is then still outside fails at once.
+const TRIES: usize = 1000;
+
 /// The true world of a [`Scenario`]: its model's own linear motion unless it names another simulator.
 pub struct ProblemWorld {
     model: Model,
@@ -83,6 +86,25 @@ impl ProblemWorld {
         tally.see(now, &self.state)
     }
 
+    /// Draws a state from the start hypothesis.
+    fn draw_start(&mut self, draws: &mut Draws) {
+        let (start, noise) = &self.starts[self.hypothesis];
+        self.state.copy_from_slice(start.mean.as_slice());
+        match start.shape {
+            StartShape::Normal => noise.add_to(&mut self.state, &mut draws.world),
+            StartShape::Uniform => {
+                for (i, value) in self.state.iter_mut().enumerate() {
+                    let width = (12.0 * start.covariance[(i, i)]).sqrt();
+                    *value += width * (uniform(&mut draws.world) - 0.5);
+                }
+            }
+        }
+        if let Some(walls) = &self.walls {
+            walls.stop(start.mean.as_slice(), &mut self.state);
+        }
+        self.body.put(&mut self.state);
+    }
+
     /// A step that ends or restarts the episode.
     fn close(&mut self, reward: f64, then: Then, draws: &mut Draws) -> Step {
         if then == Then::Restart {
@@ -105,27 +127,20 @@ impl World for ProblemWorld {
         });
         self.hypothesis = chosen.unwrap_or(self.starts.len() - 1);
         self.time = 0;
-        let (start, noise) = &self.starts[self.hypothesis];
-        self.mode = start.mode;
-        self.state.copy_from_slice(start.mean.as_slice());
-        match start.shape {
-            StartShape::Normal => noise.add_to(&mut self.state, &mut draws.world),
-            StartShape::Uniform => {
-                for (i, value) in self.state.iter_mut().enumerate() {
-                    let width = (12.0 * start.covariance[(i, i)]).sqrt();
-                    *value += width * (uniform(&mut draws.world) - 0.5);
-                }
+        self.mode = self.starts[self.hypothesis].0.mode;
+        // Who has failed before the first step was never there.
+        for _ in 0..TRIES {
+            self.draw_start(draws);
+            if self.model.episode.alive.contains(&self.state) {
+                return;
             }
         }
-        if let Some(walls) = &self.walls {
-            walls.stop(start.mean.as_slice(), &mut self.state);
-        }
-        self.body.put(&mut self.state);
     }
 
     fn step(&mut self, action: ActionId, draws: &mut Draws, observation: &mut [f64]) -> Step {
         let doing = (self.mode, action);
         let mut tally = self.model.tally(self.mode, action);
+        tally.reward += self.model.running_cost(&self.state, None, action);
         let before = self.see(When::Before, doing, &mut tally);
         let outcome = before.unwrap_or_else(|| tally.rest());
         self.mode = outcome.mode;
@@ -154,6 +169,10 @@ impl World for ProblemWorld {
             then: Then::Continue,
             failed: false,
         }
+    }
+
+    fn ending(&self) -> f64 {
+        self.model.terminal_cost(&self.state, None)
     }
 
     fn state(&self) -> &[f64] {

@@ -13,7 +13,7 @@ use nalgebra::DVector;
 use super::formulas::{Formulas, Outlook};
 use crate::belief::{Belief, BeliefMdp, ClassId};
 use crate::model::{ActionId, ModeId, Outcome, Then};
-use crate::policy::Policy;
+use crate::policy::{Policy, first_best};
 
 /// Settings of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,17 +105,6 @@ impl Policy for Branches {
     fn value(&self, belief: &Belief) -> Option<f64> {
         self.q_values(belief).into_iter().reduce(f64::max)
     }
-}
-
-/// Index of the largest value; of values equal but for rounding, the first.
-pub(crate) fn first_best(values: &[f64]) -> usize {
-    let mut best = 0;
-    for (index, &value) in values.iter().enumerate() {
-        if value > values[best] + 1e-12 * values[best].abs().max(1.0) {
-            best = index;
-        }
-    }
-    best
 }
 
 /// Index of an outlook in [`Search::outlooks`].
