@@ -1,6 +1,7 @@
 //! Solvers: from a model, or from experience, to a policy. [`solve`] runs any of them by name.
 
 pub mod arkaq;
+pub mod bound;
 pub mod cma;
 pub mod compile;
 pub mod grid;
