@@ -62,6 +62,7 @@ pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> R
     ));
     let mut policy = GridPolicy::new(mdp.clone(), grid);
     let groups = groups_of_levels(mdp);
+    observer.progress("levels", 0, groups.len() as u64);
     for (done, group) in groups.iter().enumerate() {
         policy.solve_group(group, settings);
         observer.progress("levels", done as u64 + 1, groups.len() as u64);
