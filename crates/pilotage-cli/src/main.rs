@@ -3,6 +3,7 @@
 mod check;
 mod draw;
 mod failure;
+mod learner_help;
 mod list;
 mod options;
 mod progress;
@@ -17,7 +18,13 @@ use failure::Failure;
 
 /// Turn a noisy, partly observable world into a small finite automaton that says what to do.
 #[derive(Parser)]
-#[command(version, about, max_term_width = 100, arg_required_else_help = true)]
+#[command(
+    version,
+    about,
+    max_term_width = 100,
+    arg_required_else_help = true,
+    after_help = "`pilotage solve --help` lists the settings of planners and learners."
+)]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,

@@ -66,6 +66,24 @@ pub fn policy_and_problem(
     Ok((automaton, scenario))
 }
 
+/// An argument as it is typed in a shell: in quotes where it needs them, and never taken for an option.
+pub fn quoted(argument: &str) -> String {
+    let plain =
+        |c: char| c.is_alphanumeric() || "_./-+=:,@%".contains(c) || (cfg!(windows) && c == '\\');
+    let argument = if argument.starts_with('-') {
+        format!("./{argument}")
+    } else {
+        argument.to_owned()
+    };
+    if !argument.is_empty() && argument.chars().all(plain) {
+        argument
+    } else if argument.contains(['"', '$', '`', '\\', '!']) {
+        format!("'{}'", argument.replace('\'', r"'\''"))
+    } else {
+        format!("\"{argument}\"")
+    }
+}
+
 /// A file name beside `path`: its stem, a dash, and `suffix`.
 pub fn beside(path: &Path, suffix: &str) -> PathBuf {
     let stem = path.file_stem().map_or_else(

@@ -17,11 +17,13 @@ use pilotage_report::{returns_svg, values_svg};
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::options::{Evaluation, at_least_one, beside};
+use crate::learner_help::learner_settings;
+use crate::options::{Evaluation, at_least_one, beside, quoted};
 use crate::progress::Bars;
 use crate::summary;
 
 #[derive(Args)]
+#[command(after_help = learner_settings())]
 pub struct Arguments {
     /// Name of a built-in problem (see `pilotage list`), or a model file.
     problem: String,
@@ -57,7 +59,7 @@ struct Learner {
     /// Draw how learning went: FILE-returns.svg and FILE-values.svg.
     #[arg(long, value_name = "FILE")]
     curves: Option<PathBuf>,
-    /// A setting of the learner by name, such as lambda=0.5; may be given more than once.
+    /// A setting of the learner by name, such as lambda=0.5; may be given more than once. Listed below.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
     learn: Vec<(String, String)>,
 }
@@ -347,10 +349,16 @@ fn shown(
         "  {solve:.2} s to solve, {evaluate:.2} s to evaluate, seed {}",
         arguments.evaluation.seed
     ));
-    if let Some(path) = &arguments.out {
+    if let (Some(path), Some(_)) = (&arguments.out, solution.automaton()) {
+        let file = path.display().to_string();
+        // A policy names its problem, which is enough to find a built-in one.
+        let problem = match scenario::builtin(&arguments.problem) {
+            Some(_) => String::new(),
+            None => format!(" --problem {}", quoted(&arguments.problem)),
+        };
         lines.push(format!(
-            "  kept in {0}; `pilotage draw {0}` draws it",
-            path.display()
+            "  kept in {file}; `pilotage draw {}{problem}` draws it",
+            quoted(&file)
         ));
     }
     lines.push(String::new());

@@ -3,7 +3,8 @@
 
 /// Watches an algorithm at work. Every method has a default that does nothing.
 pub trait Observer: Sync {
-    /// A stage of the work has come so far. `total` is 0 where it is not known.
+    /// A stage of the work has come so far; with nothing done it begins. `total` is 0 where it is not known. Reports of several
+    /// threads may come out of order.
     fn progress(&self, stage: &'static str, done: u64, total: u64) {
         let _ = (stage, done, total);
     }

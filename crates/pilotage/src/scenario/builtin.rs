@@ -1,7 +1,12 @@
 //! The models that are compiled in.
 
+use std::path::Path;
+
 use super::{Scenario, load, read};
-use crate::model::{ModelError, suggest};
+use crate::model::{ModelError, nearest, suggest};
+
+/// How the name of a model file ends.
+const SUFFIX: &str = ".toml";
 
 macro_rules! models {
     ($($name:literal),* $(,)?) => {
@@ -54,21 +59,67 @@ pub fn builtin(name: &str) -> Option<&'static str> {
 /// Reads the built-in model of that name, or else the model file at that path.
 ///
 /// # Errors
-/// If neither exists, with the nearest built-in name as a hint, or if the file is not a valid model.
+/// If neither exists, with the nearest built-in name or model file as a hint, or if the file is not a valid model.
 pub fn find(name_or_path: &str) -> Result<Scenario, ModelError> {
     if let Some(text) = builtin(name_or_path) {
         return read(text, name_or_path);
     }
-    let path = std::path::Path::new(name_or_path);
-    let looks_like_a_path = path.components().count() > 1 || path.extension().is_some();
-    if looks_like_a_path || path.exists() {
+    let path = Path::new(name_or_path);
+    if path.exists() {
         return load(path);
+    }
+    let meant = meant(path).map(|meant| format!("did you mean `{meant}`?"));
+    if path.components().count() > 1 || path.extension().is_some() {
+        return load(path).map_err(|error| ModelError {
+            hint: meant.unwrap_or_else(|| error.hint.clone()),
+            ..error
+        });
     }
     Err(ModelError {
         origin: name_or_path.into(),
         text: "".into(),
         place: None,
         message: "no built-in model and no file has this name".to_owned(),
-        hint: suggest(name_or_path, names()),
+        hint: meant.unwrap_or_else(|| suggest(name_or_path, names())),
     })
+}
+
+/// The built-in model, or the model file in the same folder, whose name is nearest to that of `path`.
+fn meant(path: &Path) -> Option<String> {
+    let here = path.parent()?;
+    let stem = path.file_stem()?.to_str()?;
+    let in_folder = model_files(here).into_iter().filter_map(|file| {
+        let shown = here.join(&file).display().to_string();
+        Some((file.strip_suffix(SUFFIX)?.to_owned(), shown))
+    });
+    let built_in = names().map(|name| (name.to_owned(), name.to_owned()));
+    // Of two that are as near, the first is meant.
+    let known: Vec<(String, String)> = if here != Path::new("") {
+        in_folder.collect()
+    } else if path.extension().is_some() {
+        in_folder.chain(built_in).collect()
+    } else {
+        built_in.chain(in_folder).collect()
+    };
+    let found = nearest(stem, known.iter().map(|(stem, _)| stem.as_str()))?;
+    let (_, shown) = known.iter().find(|(stem, _)| stem == found)?;
+    Some(shown.clone())
+}
+
+/// Names of the model files in a folder that can be shown, in order; of a very large folder, some of them.
+fn model_files(folder: &Path) -> Vec<String> {
+    let folder = if folder == Path::new("") {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let mut files: Vec<String> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .take(10_000)
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.ends_with(SUFFIX) && !name.chars().any(char::is_control))
+        .collect();
+    files.sort();
+    files
 }

@@ -110,6 +110,7 @@ impl StateMdp {
         let smoothers = mdp.smoothers();
         let discount = mdp.model().discount;
         let target = settings.tolerance * (1.0 - discount) / discount.max(1e-9);
+        observer.progress("sweeps", 0, 0);
         for sweep in 0..settings.sweeps {
             let change = mdp.sweep(&entries, &smoothers);
             observer.progress("sweeps", sweep as u64 + 1, 0);

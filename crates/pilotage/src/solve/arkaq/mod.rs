@@ -219,6 +219,8 @@ impl<'a> Run<'a> {
         if state.policy.epochs() == 0 {
             observer.note(&state.world.describe());
         }
+        let limit = task.settings.epoch_limit as u64;
+        observer.progress("epochs", state.policy.epochs() as u64, limit);
         let filter = task.filter.clone().recalling(state.world.recall.clone());
         let reward = state.policy.run_epoch(task, &filter, &mut state.experience);
         let (samples, epochs) = (state.experience.samples, state.policy.epochs() as u64);
@@ -228,7 +230,7 @@ impl<'a> Run<'a> {
             reward,
             states: state.policy.choices(),
         });
-        observer.progress("epochs", epochs, task.settings.epoch_limit as u64);
+        observer.progress("epochs", epochs, limit);
         observer.note(&format!(
             "{samples} steps: {reward:.3} a step, {states} states"
         ));

@@ -210,15 +210,13 @@ impl<'a> Run<'a> {
         let Some(mut steady) = self.state.learning.take() else {
             return;
         };
+        let limit = self.task.settings.epoch_limit as u64;
+        observer.progress("epochs", steady.epochs() as u64, limit);
         let earned = steady.run_epoch(&self.task, &mut self.state.experience);
         self.state
             .curve
             .push(self.point(&steady, earned.reward / earned.steps as f64));
-        observer.progress(
-            "epochs",
-            steady.epochs() as u64,
-            self.task.settings.epoch_limit as u64,
-        );
+        observer.progress("epochs", steady.epochs() as u64, limit);
         let regions: usize = steady.regions.iter().map(Vec::len).sum();
         observer.status(&format!(
             "{} steps, {:.3} a step, {regions} nodes",

@@ -79,6 +79,7 @@ pub(super) fn learn(task: &Task<'_>, observer: &dyn Observer) -> Learned {
     let over = |experience: &Experience, calm: u64, regions: &[Region]| {
         calm >= CALM || experience.samples >= step_limit as u64 || regions.len() >= region_limit
     };
+    observer.progress("steps", 0, step_limit as u64);
     while !over(&experience, calm, &regions) {
         let (mut draws, mut exploration) = experience.next_episode(task.settings.seed);
         actor.reset(&mut draws);

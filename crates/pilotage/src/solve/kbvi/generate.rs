@@ -97,11 +97,12 @@ pub fn generate(
     let planner = Branches::new(mdp.clone(), settings.search);
     let mut history: Vec<(usize, usize)> = Vec::new();
     let mut automaton = Automaton::new(mdp, "kbvi", settings.matching);
+    let total = (settings.last_horizon - first + 1) as u64;
+    observer.progress("horizons", 0, total);
     for horizon in first..=settings.last_horizon {
         automaton = at_horizon(&planner.with_horizon(horizon), settings);
         history.push((horizon, automaton.nodes.len()));
-        let total = settings.last_horizon - first + 1;
-        observer.progress("horizons", (horizon - first + 1) as u64, total as u64);
+        observer.progress("horizons", (horizon - first + 1) as u64, total);
         if settled(&history, settings.repeats) {
             break;
         }

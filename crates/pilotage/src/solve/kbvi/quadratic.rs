@@ -77,6 +77,7 @@ pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> R
         steps(settings, groups.len()) / 1e6,
     ));
     let mut search = Search::new(mdp, settings, observer, groups, greedy_gain(mdp, settings)?);
+    observer.progress("policy search", 0, search.total);
     search.improve_steady(steady);
     search.improve_early();
     let mut automaton = search.automaton(&search.gains);
