@@ -178,6 +178,11 @@ fn refined(axis: &Axis, apart: f64) -> Axis {
     }
 }
 
+/// Without the last digits of a difference.
+fn rounded(length: f64) -> f64 {
+    (length * 1e9).round() / 1e9
+}
+
 /// Whether nothing that is paid falls between two points.
 fn resolves(mdp: &BeliefMdp, axes: &[Axis]) -> Result<()> {
     let model = mdp.model();
@@ -189,14 +194,14 @@ fn resolves(mdp: &BeliefMdp, axes: &[Axis]) -> Result<()> {
         let width = |region: &Region| region.side(variable).width();
         let narrowest = paid_places(model).min_by(|a, b| width(a.1).total_cmp(&width(b.1)));
         let what = narrowest.map_or_else(String::new, |(what, region)| {
-            format!("{what} is {} wide", width(region))
+            format!("{what} is {} wide", rounded(width(region)))
         });
         return Err(unsupported(
             model,
             format!(
                 "{what} along {}, and the points of the grid are {} apart; give at least {} points (--grid), more memory, or narrower bounds",
                 model.state[variable].name,
-                axis.step,
+                rounded(axis.step),
                 ((axis.count - 1) as f64 * axis.step / apart).ceil() + 1.0
             ),
         ));
