@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use pilotage::model::{self, Model, WallBelief, Walls};
-use pilotage::policy::write_whole;
+use pilotage::policy::{check_writable, write_whole};
 use pilotage::report::{returns_svg, values_svg};
 use pilotage::simulate::{Estimate, Evaluation as Earned};
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
@@ -46,6 +46,9 @@ pub struct Arguments {
     #[command(flatten)]
     learner: Learner,
 }
+
+/// What the files of the curves end in.
+const CURVES: [&str; 2] = ["returns.svg", "values.svg"];
 
 #[derive(Args)]
 #[command(next_help_heading = "Learner settings")]
@@ -97,11 +100,11 @@ impl Learner {
             return Ok(Vec::new());
         };
         let pictures = [
-            ("returns.svg", returns_svg(automaton, learning)?),
-            ("values.svg", values_svg(automaton, learning)?),
+            returns_svg(automaton, learning)?,
+            values_svg(automaton, learning)?,
         ];
         let mut files = Vec::new();
-        for (suffix, picture) in pictures {
+        for (suffix, picture) in CURVES.into_iter().zip(pictures) {
             let file = beside(path, suffix);
             write_whole(&file, picture.as_bytes())?;
             files.push(file);
@@ -177,6 +180,16 @@ impl Formula {
 }
 
 impl Arguments {
+    /// Files that cannot be written are known before work is done that they should keep.
+    fn check_files(&self) -> Result<(), Failure> {
+        let curves = self.learner.curves.iter();
+        let curves = curves.flat_map(|path| CURVES.map(|suffix| beside(path, suffix)));
+        for path in self.out.clone().into_iter().chain(curves) {
+            check_writable(&path)?;
+        }
+        Ok(())
+    }
+
     fn settings(&self, solver: SolverKind) -> Result<SolveSettings, Failure> {
         Ok(SolveSettings {
             form: Form::parse(&self.policy)?,
@@ -224,6 +237,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         )));
     }
     let model = model::find(&arguments.problem)?;
+    arguments.check_files()?;
     arguments.evaluation.start_threads()?;
     let bars = Bars::new(arguments.json);
 
