@@ -6,6 +6,8 @@ use std::sync::Mutex;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pilotage::observe::Observer;
 
+use crate::failure::say;
+
 /// Shows the stages of the work on standard error.
 pub struct Bars {
     current: Mutex<Option<(&'static str, ProgressBar)>>,
@@ -75,7 +77,7 @@ impl Observer for Bars {
             .and_then(|current| current.as_ref())
         {
             Some((_, bar)) => bar.println(message),
-            None => eprintln!("{message}"),
+            None => say(message),
         }
     }
 }

@@ -10,20 +10,21 @@ use pilotage::policy::{check_writable, write_whole};
 use pilotage::report::{returns_svg, values_svg};
 use pilotage::simulate::{Estimate, Evaluation as Earned};
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
+use pilotage::solve::kbvi::quadratic::MOST_EFFORT;
 use pilotage::solve::lqg::Weights;
 use pilotage::solve::{Form, Solution, SolveSettings, SolverKind, solve};
 use pilotage::solve::{arkaq, kafaq};
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::options::{Evaluation, at_least_one, beside};
+use crate::options::{Evaluation, at_least_one, beside, shown as shown_path};
 use crate::progress::Bars;
 use crate::summary;
 
 #[derive(Args)]
 pub struct Arguments {
     /// Name of a built-in problem (see `pilotage list`), or a model file.
-    problem: String,
+    problem: PathBuf,
     /// Solver to use (see `pilotage list`).
     #[arg(long, value_name = "SOLVER", default_value = "kbvi-closed")]
     with: String,
@@ -62,6 +63,14 @@ struct Learner {
     /// A setting of the learner by name, such as lambda=0.5; may be given more than once.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
     learn: Vec<(String, String)>,
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(factor) if factor > 0.0 && factor <= MOST_EFFORT => Ok(factor),
+        Ok(_) => Err(format!("must be above 0, at most {MOST_EFFORT}")),
+        Err(error) => Err(format!("{error}")),
+    }
 }
 
 fn key_and_value(text: &str) -> Result<(String, String), String> {
@@ -135,7 +144,7 @@ struct Planner {
     #[arg(long, value_name = "EPISODES", value_parser = at_least_one)]
     runs: Option<usize>,
     /// Factor on the length of a policy search's simulations: less is faster, more is thorougher.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
     effort: f64,
     /// kbvi looks less far ahead with every step of an episode.
     #[arg(long)]
@@ -250,6 +259,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let curves = arguments.learner.draw(&solution)?;
     let clock = Instant::now();
     let earned = solution.evaluate(&model, arguments.evaluation.options(), &bars);
+    earned.check()?;
     let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
     let lost = arguments
         .value_lost
@@ -277,7 +287,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             )?;
         }
         for file in curves {
-            writeln!(out, "  {}", file.display())?;
+            writeln!(out, "  {}", shown_path(&file))?;
         }
     }
     Ok(())
@@ -363,7 +373,7 @@ fn shown(
     if let Some(path) = &arguments.out {
         lines.push(format!(
             "  kept in {0}; `pilotage draw {0}` draws it",
-            path.display()
+            shown_path(path)
         ));
     }
     lines.push(String::new());

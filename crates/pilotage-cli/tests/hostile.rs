@@ -2,8 +2,10 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::Read;
+use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -235,4 +237,173 @@ fn signals_leave_no_temporary_files() {
         assert!(left.iter().all(|name| name == "run.json"), "{left:?}");
     }
     assert_eq!(listing(here), ["run.json"]);
+}
+
+fn built_in(name: &str) -> String {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    fs::read_to_string(models.join(format!("{name}.toml"))).unwrap()
+}
+
+/// A command that must end with one message that holds certain words, and in time.
+fn refused(folder: &Path, arguments: &[&str], says: &str) {
+    let clock = Instant::now();
+    let output = pilotage(folder, arguments).output().unwrap();
+    let said = text(&output.stderr);
+    let code = output.status.code();
+    assert!(
+        matches!(code, Some(1 | 2)),
+        "{arguments:?}: {code:?}, {said}"
+    );
+    assert_eq!(said.matches("error:").count(), 1, "{arguments:?}: {said}");
+    assert!(said.contains(says), "{arguments:?}: {said}");
+    assert!(output.stdout.is_empty(), "{arguments:?} prints a result");
+    assert!(clock.elapsed() < Duration::from_secs(20), "{arguments:?}");
+}
+
+const MAX: &str = "18446744073709551615";
+
+#[test]
+fn extreme_settings_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: &[(&[&str], &str)] = &[
+        (&["--threads", "100000"], "at most 1024"),
+        (&["--threads", MAX], "at most 1024"),
+        (&["--effort", "nan"], "above 0, at most 1000"),
+        (&["--effort", "0"], "above 0, at most 1000"),
+        (&["--effort", "inf"], "above 0, at most 1000"),
+        (&["--effort", "1e300"], "above 0, at most 1000"),
+        (&["--grid", "0"], "points = 0 is out of range"),
+        (&["--grid", "1"], "points = 1 is out of range"),
+        (
+            &["--with", "qmdp", "--grid", "0"],
+            "points = 0 is out of range",
+        ),
+    ];
+    for (settings, says) in rows {
+        refused(
+            folder.path(),
+            &[&["solve", "corridor"], *settings].concat(),
+            says,
+        );
+    }
+}
+
+#[test]
+fn streams_that_are_full_or_closed_end_in_an_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    for (line, fits) in [
+        ("pilotage check corridor > /dev/full", false),
+        ("pilotage check --schema > /dev/full", false),
+        ("pilotage list > /dev/full", false),
+        ("pilotage list --json > /dev/full", false),
+        ("pilotage --help > /dev/full", false),
+        ("pilotage --version > /dev/full", false),
+        ("pilotage solve tiger --episodes 10 > /dev/full", false),
+        ("pilotage check nowhere 2> /dev/full", false),
+        ("pilotage check nowhere 2>&-", false),
+        ("pilotage check nowhere 2> >(true)", false),
+        ("pilotage solve corridor --seed x 2> /dev/full", false),
+        ("pilotage check nowhere > /dev/full 2>&1", false),
+        ("pilotage check corridor 2> /dev/full", true),
+        ("pilotage check corridor 2>&-", true),
+        ("pilotage check corridor <&- 2>&-", true),
+    ] {
+        let output = shell(folder.path(), &format!("{line}\nexit $?"));
+        let code = output.status.code();
+        assert!(
+            if fits {
+                code == Some(0)
+            } else {
+                matches!(code, Some(1 | 2))
+            },
+            "{line}: {code:?}"
+        );
+        assert!(!text(&output.stderr).contains("panicked"), "{line}");
+    }
+}
+
+#[test]
+fn a_path_that_is_not_utf8_is_a_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, policy) = (
+        OsStr::from_bytes(b"hall\xff.toml"),
+        OsStr::from_bytes(b"p\xfe.json"),
+    );
+    fs::write(folder.path().join(model), built_in("corridor")).unwrap();
+    let (out, problem) = (OsStr::new("--out"), OsStr::new("--problem"));
+    let word = OsStr::new;
+    let episodes = [word("--episodes"), word("10")];
+    for arguments in [
+        vec![word("check"), model],
+        vec![word("solve"), model, out, policy, episodes[0], episodes[1]],
+        vec![
+            word("simulate"),
+            model,
+            word("--policy"),
+            policy,
+            word("--world"),
+            model,
+            episodes[0],
+            episodes[1],
+        ],
+        vec![word("draw"), policy, problem, model],
+    ] {
+        let output = pilotage(folder.path(), &[])
+            .args(&arguments)
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{arguments:?}: {}",
+            text(&output.stderr)
+        );
+    }
+    let pictures = fs::read_dir(folder.path()).unwrap();
+    let names: Vec<_> = pictures.map(|entry| entry.unwrap().file_name()).collect();
+    assert!(
+        names.contains(&OsStr::from_bytes(b"p\xfe-map.svg").to_owned()),
+        "{names:?}"
+    );
+}
+
+/// A policy names its problem; that is no reason to read whatever file it names.
+#[test]
+fn a_policy_does_not_choose_the_files_that_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(solve_to(folder.path(), "p.json").status.success());
+    let policy = fs::read_to_string(folder.path().join("p.json")).unwrap();
+    fs::write(folder.path().join("secret"), "password = 'abc'").unwrap();
+    let named = policy.replacen("\"tiger\"", "\"secret\"", 1);
+    fs::write(folder.path().join("p.json"), named).unwrap();
+    let output = pilotage(folder.path(), &["draw", "p.json"])
+        .output()
+        .unwrap();
+    assert!(!output.status.success());
+    assert!(!text(&output.stderr).contains("password"));
+}
+
+/// However many episodes are asked for, few are kept.
+#[test]
+fn a_million_million_episodes_take_no_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(solve_to(folder.path(), "p.json").status.success());
+    for line in [
+        "simulate tiger --policy p.json --episodes 1000000000000",
+        &format!("simulate tiger --policy p.json --episodes {MAX}"),
+        "solve tiger --value-lost --episodes 1000000000000",
+        "solve scalar-lqg --with lqg --episodes 1000000000000",
+    ] {
+        let limited = format!(
+            "ulimit -v 2000000; timeout 1.5 '{}' {line}",
+            env!("CARGO_BIN_EXE_pilotage")
+        );
+        let output = shell(folder.path(), &limited);
+        // Still at it when it was told to stop.
+        assert_eq!(
+            output.status.code(),
+            Some(124),
+            "{line}: {}",
+            text(&output.stderr)
+        );
+    }
 }

@@ -1,5 +1,7 @@
 //! The models that are compiled in.
 
+use std::path::Path;
+
 use super::error::suggest;
 use super::{Model, ModelError, load, read};
 
@@ -55,20 +57,21 @@ pub fn builtin(name: &str) -> Option<&'static str> {
 ///
 /// # Errors
 /// If neither exists, with the nearest built-in name as a hint, or if the file is not a valid model.
-pub fn find(name_or_path: &str) -> Result<Model, ModelError> {
-    if let Some(text) = builtin(name_or_path) {
-        return read(text, name_or_path);
+pub fn find(name_or_path: impl AsRef<Path>) -> Result<Model, ModelError> {
+    let path = name_or_path.as_ref();
+    let name = path.to_string_lossy();
+    if let Some(text) = builtin(&name) {
+        return read(text, &name);
     }
-    let path = std::path::Path::new(name_or_path);
     let looks_like_a_path = path.components().count() > 1 || path.extension().is_some();
     if looks_like_a_path || path.exists() {
         return load(path);
     }
     Err(ModelError {
-        origin: name_or_path.into(),
+        origin: name.as_ref().into(),
         text: "".into(),
         place: None,
         message: "no built-in model and no file has this name".to_owned(),
-        hint: suggest(name_or_path, names()),
+        hint: suggest(&name, names()),
     })
 }

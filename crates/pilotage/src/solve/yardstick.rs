@@ -162,6 +162,7 @@ fn mode_seen(model: &Model, policy: &dyn Policy, options: Options) -> Evaluation
         undiscounted: Estimate::of(episodes.iter().map(|episode| episode.undiscounted)),
         steps: Estimate::of(episodes.iter().map(|episode| episode.steps as f64)),
         failed: 0.0,
+        lost: None,
     }
 }
 

@@ -70,10 +70,10 @@ pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> R
 }
 
 fn check(settings: &Settings) -> Result<()> {
-    if settings.points.is_some_and(|points| points < 2) {
+    if let Some(points) = settings.points.filter(|points| *points < 2) {
         return Err(Error::Setting {
             setting: "points",
-            value: format!("{:?}", settings.points),
+            value: points.to_string(),
             range: "at least 2",
         });
     }
