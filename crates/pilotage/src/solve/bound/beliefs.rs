@@ -278,11 +278,7 @@ impl<'a> Planner<'a> {
         let mut planner = Self {
             ceiling: Ceiling::new(frame.model),
             lattice: [
-                Axis {
-                    low: 0.0,
-                    step: 1.0,
-                    count: 1,
-                };
+                Axis::stepped(0.0, 1.0, 1);
                 2
             ],
             frame,
@@ -341,11 +337,7 @@ impl<'a> Planner<'a> {
     /// About so many points, a whole number of them to every displacement if that can be.
     fn axis(&self, i: usize, count: usize) -> Axis {
         if !self.frame.is_real(i) {
-            return Axis {
-                low: 0.0,
-                step: 1.0,
-                count: 1,
-            };
+            return Axis::stepped(0.0, 1.0, 1);
         }
         let AxisModel { displacement, .. } = &self.frame.axes[i];
         let core = self.frame.core(i);
@@ -362,11 +354,7 @@ impl<'a> Planner<'a> {
             Some(measure) if measure >= coarse => measure / (measure / coarse).ceil(),
             _ => coarse,
         };
-        Axis {
-            low,
-            step,
-            count: (width / step).ceil() as usize + 1,
-        }
+        Axis::stepped(low, step, (width / step).ceil() as usize + 1)
     }
 
     fn index(&self, mode: ModeId, level: usize) -> usize {
