@@ -34,6 +34,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let model = model::find(file)?;
     let mdp = BeliefMdp::new(&model);
     let levels = mdp.levels();
+    levels.check(&model)?;
     let sd = |level: usize| -> Vec<f64> {
         levels
             .covariance(level)

@@ -26,6 +26,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (automaton, model) = policy_and_problem(&arguments.policy, arguments.problem.as_deref())?;
     let mdp = BeliefMdp::new(&model);
+    mdp.levels().check(&model)?;
     let pictures = [
         ("automaton.svg", automaton_svg(&automaton)?),
         (

@@ -6,13 +6,17 @@
 
 use nalgebra::DMatrix;
 
-use super::kalman::{Correction, distance};
+use super::kalman::Correction;
+use super::nearby::Nearby;
 use super::riccati::steady_state;
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Model};
 
 /// Covariances this close are the same number.
 const SAME: f64 = 1e-9;
+
+/// Most numbers that all levels and their steps may be.
+const MOST_NUMBERS: usize = 1 << 26;
 
 /// Index of an uncertainty level.
 pub type LevelId = usize;
@@ -41,6 +45,7 @@ pub struct LevelStep {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelGraph {
     covariances: Vec<DMatrix<f64>>,
+    nearby: Nearby,
     /// Levels at which a class has come to rest.
     settled: Vec<bool>,
     classes: Vec<NoiseClass>,
@@ -50,6 +55,10 @@ pub struct LevelGraph {
     starts: Vec<LevelId>,
     /// Whether every chain closed before the limit of levels.
     converged: bool,
+    /// Most levels there is room for.
+    room: usize,
+    /// Whether there were more.
+    cramped: bool,
 }
 
 impl LevelGraph {
@@ -96,14 +105,20 @@ impl LevelGraph {
                     })
             })
             .collect();
+        let (n, m) = (model.state_dim(), model.observation_dim());
+        let step = 2 * n * n + n * m + m * m;
+        let room = MOST_NUMBERS / (n * n + classes.len() * step).max(1);
         Self {
             covariances: Vec::new(),
+            nearby: Nearby::default(),
             settled: Vec::new(),
             classes,
             class_of_action,
             steps: Vec::new(),
             starts: Vec::new(),
             converged: true,
+            room,
+            cramped: false,
         }
     }
 
@@ -125,11 +140,12 @@ impl LevelGraph {
                 self.settle(model, class, &correction.covariance)
             }
             Some(found) => found,
-            None if self.covariances.len() < model.belief.level_limit => {
+            None if self.covariances.len() < model.belief.level_limit.min(self.room) => {
                 self.add(correction.covariance.clone())
             }
             None => {
                 self.converged = false;
+                self.cramped |= self.room < model.belief.level_limit;
                 level
             }
         };
@@ -152,6 +168,7 @@ impl LevelGraph {
     }
 
     fn add(&mut self, covariance: DMatrix<f64>) -> LevelId {
+        self.nearby.insert(&covariance, self.covariances.len());
         self.covariances.push(covariance);
         self.settled.push(false);
         self.steps.push(Vec::with_capacity(self.classes.len()));
@@ -159,11 +176,8 @@ impl LevelGraph {
     }
 
     fn nearest(&self, covariance: &DMatrix<f64>, tolerance: f64) -> Option<LevelId> {
-        (0..self.covariances.len())
-            .map(|level| (level, distance(covariance, &self.covariances[level])))
-            .filter(|&(_, distance)| distance <= tolerance)
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(level, _)| level)
+        self.nearby
+            .nearest(&self.covariances, covariance, tolerance)
     }
 
     /// Number of levels.
@@ -206,6 +220,73 @@ impl LevelGraph {
         self.converged
     }
 
+    /// Checks that every covariance is one: finite, and positive semi-definite but for rounding.
+    ///
+    /// # Errors
+    /// [`Error::Level`] for the first level or step that has none, with the entry and what to change; [`Error::TooManyLevels`] where there
+    /// is no room for all of them.
+    pub fn check(&self, model: &Model) -> Result<()> {
+        if self.cramped {
+            return Err(Error::TooManyLevels {
+                levels: self.room,
+                mebibytes: (MOST_NUMBERS * size_of::<f64>()) >> 20,
+            });
+        }
+        for level in 0..self.len() {
+            self.check_level(model, level)?;
+            for (class, step) in self.steps[level].iter().enumerate() {
+                let correction = &step.correction;
+                for (what, matrix) in [
+                    ("predicted covariance", &correction.predicted),
+                    ("innovation covariance", &correction.innovation),
+                    ("gain", &correction.gain),
+                    ("covariance after it", &correction.covariance),
+                ] {
+                    if let Some((row, column)) = not_finite(matrix) {
+                        let action = (0..self.class_of_action.len())
+                            .find(|&action| self.class_of_action[action] == class)
+                            .map_or("", |action| &model.actions[action].name);
+                        return Err(Error::Level {
+                            level,
+                            what: format!("the {what} of the step by {action}"),
+                            entry: format!("entry [{row}][{column}]"),
+                            value: matrix[(row, column)],
+                        });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_level(&self, model: &Model, level: LevelId) -> Result<()> {
+        /// Share of the largest entry that rounding may make negative.
+        const ROUNDING: f64 = 1e-9;
+        let covariance = &self.covariances[level];
+        let name = |i: usize| &model.state[i].name;
+        let fail = |entry: String, value: f64| {
+            Err(Error::Level {
+                level,
+                what: "the covariance".to_owned(),
+                entry,
+                value,
+            })
+        };
+        if let Some((row, column)) = not_finite(covariance) {
+            let entry = format!("the entry of {} and {}", name(row), name(column));
+            return fail(entry, covariance[(row, column)]);
+        }
+        let scale = covariance.amax();
+        if scale == 0.0 {
+            return Ok(());
+        }
+        let least = (covariance / scale).symmetric_eigenvalues().min();
+        if least < -ROUNDING {
+            return fail("the smallest eigenvalue".to_owned(), least * scale);
+        }
+        Ok(())
+    }
+
     /// Checks that no uncertainty grows for ever. Levels that were cut at the limit while they still shrank will do.
     ///
     /// # Errors
@@ -245,4 +326,12 @@ impl LevelGraph {
         }
         None
     }
+}
+
+/// Row and column of the first entry that is not finite.
+fn not_finite(matrix: &DMatrix<f64>) -> Option<(usize, usize)> {
+    let entries = (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| (i, j)));
+    entries
+        .into_iter()
+        .find(|&entry| !matrix[entry].is_finite())
 }

@@ -427,6 +427,10 @@ fn are_points(model: &Model) -> bool {
 impl Points {
     fn new(model: &Model, levels: &LevelGraph, mean: &DVector<f64>) -> Self {
         let inverse = |matrix: &DMatrix<f64>| {
+            // No decomposition of a matrix that is not finite comes to an end.
+            if matrix.iter().any(|entry| !entry.is_finite()) {
+                return matrix.clone();
+            }
             matrix
                 .clone()
                 .pseudo_inverse(1e-12 * matrix.amax().max(1e-300))

@@ -6,6 +6,7 @@ pub mod hypotheses;
 pub mod kalman;
 pub mod levels;
 pub mod mdp;
+mod nearby;
 pub mod recall;
 pub mod riccati;
 
