@@ -34,6 +34,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let model = scenario::find(file)?.model;
     let mdp = BeliefMdp::new(&model);
     let levels = mdp.levels();
+    levels.check(&model)?;
     let sd = |level: usize| -> Vec<f64> {
         levels
             .covariance(level)

@@ -27,6 +27,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (automaton, scenario) =
         policy_and_problem(&arguments.policy, arguments.problem.as_deref())?;
     let mdp = BeliefMdp::new(&scenario.model);
+    mdp.levels().check(&scenario.model)?;
     let pictures = [
         ("automaton.svg", automaton_svg(&automaton)?),
         (

@@ -31,6 +31,30 @@ pub enum Error {
         /// What to change in the model.
         remedy: &'static str,
     },
+    /// The uncertainty of a belief cannot be computed.
+    #[error(
+        "uncertainty level {level} is that of no belief: {entry} of {what} is {value:e}; the numbers of A, H and the noises are too large, or too far apart, to be multiplied: state the model in units, and with time steps, in which they are nearer to 1"
+    )]
+    Level {
+        /// The level, counted from the start.
+        level: usize,
+        /// The matrix.
+        what: String,
+        /// Which number of it.
+        entry: String,
+        /// The number.
+        value: f64,
+    },
+    /// There are more uncertainty levels than there is room for.
+    #[error(
+        "{levels} uncertainty levels of this model take {mebibytes} MiB, and there are more; set `level_limit` in [belief] to {levels} or less, or `level_tolerance` higher"
+    )]
+    TooManyLevels {
+        /// Levels that there is room for.
+        levels: usize,
+        /// Memory that they take, MiB.
+        mebibytes: usize,
+    },
     /// A solver was given a model it is not made for.
     #[error("{solver} does not accept {model}: {reason}")]
     Unsupported {
