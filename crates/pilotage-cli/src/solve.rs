@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use pilotage::model::WallBelief;
-use pilotage::policy::write_whole;
+use pilotage::policy::{check_writable, write_whole};
 use pilotage::scenario::{self, Scenario, Walls};
 use pilotage::simulate::{Estimate, Evaluation as Earned};
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
+use pilotage::solve::kbvi::quadratic::MOST_EFFORT;
 use pilotage::solve::lqg::Weights;
 use pilotage::solve::{Form, Solution, SolveSettings, SolverKind, solve};
 use pilotage::solve::{arkaq, kafaq};
@@ -18,7 +19,7 @@ use serde_json::json;
 
 use crate::failure::Failure;
 use crate::learner_help::learner_settings;
-use crate::options::{Evaluation, at_least_one, beside, quoted};
+use crate::options::{Evaluation, at_least_one, beside, quoted, shown as shown_path};
 use crate::progress::Bars;
 use crate::summary;
 
@@ -26,7 +27,7 @@ use crate::summary;
 #[command(after_help = learner_settings())]
 pub struct Arguments {
     /// Name of a built-in problem (see `pilotage list`), or a model file.
-    problem: String,
+    problem: PathBuf,
     /// Solver to use (see `pilotage list`).
     #[arg(long, value_name = "SOLVER", default_value = "kbvi-closed")]
     with: String,
@@ -50,6 +51,9 @@ pub struct Arguments {
     learner: Learner,
 }
 
+/// What the files of the curves end in.
+const CURVES: [&str; 2] = ["returns.svg", "values.svg"];
+
 #[derive(Args)]
 #[command(next_help_heading = "Learner settings")]
 struct Learner {
@@ -62,6 +66,14 @@ struct Learner {
     /// A setting of the learner by name, such as lambda=0.5; may be given more than once. Listed below.
     #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
     learn: Vec<(String, String)>,
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(factor) if factor > 0.0 && factor <= MOST_EFFORT => Ok(factor),
+        Ok(_) => Err(format!("must be above 0, at most {MOST_EFFORT}")),
+        Err(error) => Err(format!("{error}")),
+    }
 }
 
 fn key_and_value(text: &str) -> Result<(String, String), String> {
@@ -100,11 +112,11 @@ impl Learner {
             return Ok(Vec::new());
         };
         let pictures = [
-            ("returns.svg", returns_svg(automaton, learning)?),
-            ("values.svg", values_svg(automaton, learning)?),
+            returns_svg(automaton, learning)?,
+            values_svg(automaton, learning)?,
         ];
         let mut files = Vec::new();
-        for (suffix, picture) in pictures {
+        for (suffix, picture) in CURVES.into_iter().zip(pictures) {
             let file = beside(path, suffix);
             write_whole(&file, picture.as_bytes())?;
             files.push(file);
@@ -135,7 +147,7 @@ struct Planner {
     #[arg(long, value_name = "EPISODES", value_parser = at_least_one)]
     runs: Option<usize>,
     /// Factor on the length of a policy search's simulations: less is faster, more is thorougher.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
     effort: f64,
     /// kbvi looks less far ahead with every step of an episode.
     #[arg(long)]
@@ -180,6 +192,16 @@ impl Formula {
 }
 
 impl Arguments {
+    /// Files that cannot be written are known before work is done that they should keep.
+    fn check_files(&self) -> Result<(), Failure> {
+        let curves = self.learner.curves.iter();
+        let curves = curves.flat_map(|path| CURVES.map(|suffix| beside(path, suffix)));
+        for path in self.out.clone().into_iter().chain(curves) {
+            check_writable(&path)?;
+        }
+        Ok(())
+    }
+
     fn settings(&self, solver: SolverKind) -> Result<SolveSettings, Failure> {
         Ok(SolveSettings {
             form: Form::parse(&self.policy)?,
@@ -227,6 +249,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         )));
     }
     let scenario = scenario::find(&arguments.problem)?;
+    arguments.check_files()?;
     arguments.evaluation.start_threads()?;
     let bars = Bars::new(arguments.json);
 
@@ -239,6 +262,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let curves = arguments.learner.draw(&solution)?;
     let clock = Instant::now();
     let earned = solution.evaluate(&scenario, arguments.evaluation.options(), &bars)?;
+    earned.check()?;
     let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
     let lost = arguments
         .value_lost
@@ -266,7 +290,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             )?;
         }
         for file in curves {
-            writeln!(out, "  {}", file.display())?;
+            writeln!(out, "  {}", shown_path(&file))?;
         }
     }
     Ok(())
@@ -350,15 +374,15 @@ fn shown(
         arguments.evaluation.seed
     ));
     if let (Some(path), Some(_)) = (&arguments.out, solution.automaton()) {
-        let file = path.display().to_string();
         // A policy names its problem, which is enough to find a built-in one.
-        let problem = match scenario::builtin(&arguments.problem) {
+        let problem = match arguments.problem.to_str().and_then(scenario::builtin) {
             Some(_) => String::new(),
             None => format!(" --problem {}", quoted(&arguments.problem)),
         };
         lines.push(format!(
-            "  kept in {file}; `pilotage draw {}{problem}` draws it",
-            quoted(&file)
+            "  kept in {}; `pilotage draw {}{problem}` draws it",
+            shown_path(path),
+            quoted(path)
         ));
     }
     lines.push(String::new());

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{Scenario, load, read};
+use crate::error::is_unseen;
 use crate::model::{ModelError, nearest, suggest};
 
 /// How the name of a model file ends.
@@ -60,11 +61,12 @@ pub fn builtin(name: &str) -> Option<&'static str> {
 ///
 /// # Errors
 /// If neither exists, with the nearest built-in name or model file as a hint, or if the file is not a valid model.
-pub fn find(name_or_path: &str) -> Result<Scenario, ModelError> {
-    if let Some(text) = builtin(name_or_path) {
-        return read(text, name_or_path);
+pub fn find(name_or_path: impl AsRef<Path>) -> Result<Scenario, ModelError> {
+    let path = name_or_path.as_ref();
+    let name = path.to_string_lossy();
+    if let Some(text) = builtin(&name) {
+        return read(text, &name);
     }
-    let path = Path::new(name_or_path);
     if path.exists() {
         return load(path);
     }
@@ -76,11 +78,11 @@ pub fn find(name_or_path: &str) -> Result<Scenario, ModelError> {
         });
     }
     Err(ModelError {
-        origin: name_or_path.into(),
+        origin: name.as_ref().into(),
         text: "".into(),
         place: None,
         message: "no built-in model and no file has this name".to_owned(),
-        hint: meant.unwrap_or_else(|| suggest(name_or_path, names())),
+        hint: meant.unwrap_or_else(|| suggest(&name, names())),
     })
 }
 
@@ -118,7 +120,7 @@ fn model_files(folder: &Path) -> Vec<String> {
         .flatten()
         .take(10_000)
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .filter(|name| name.ends_with(SUFFIX) && !name.chars().any(char::is_control))
+        .filter(|name| name.ends_with(SUFFIX) && !name.contains(is_unseen))
         .collect();
     files.sort();
     files

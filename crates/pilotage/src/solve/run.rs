@@ -104,8 +104,9 @@ pub fn solve(
     observer: &dyn Observer,
 ) -> Result<Solution> {
     let model = &scenario.model;
-    kind.accepts_with(model, settings)?;
     let mdp = BeliefMdp::new(model);
+    mdp.levels().check(model)?;
+    kind.accepts_with(model, settings)?;
     if kind == SolverKind::Lqg && lqg::use_of(model) == Ok(lqg::Use::Control) {
         return control(&mdp);
     }

@@ -90,10 +90,10 @@ pub(super) fn iterate(
 }
 
 fn check(settings: &Settings) -> Result<()> {
-    if settings.points.is_some_and(|points| points < 2) {
+    if let Some(points) = settings.points.filter(|points| *points < 2) {
         return Err(Error::Setting {
             setting: "points",
-            value: settings.points.unwrap_or_default().to_string(),
+            value: points.to_string(),
             range: "at least 2",
         });
     }

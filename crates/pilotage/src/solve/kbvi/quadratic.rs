@@ -20,12 +20,15 @@ use crate::solve::hazard::{Runs, Sample};
 use crate::solve::lqr::lqr_gain;
 use crate::solve::refine::{Phase, refine};
 
+/// Most [`Settings::effort`].
+pub const MOST_EFFORT: f64 = 1000.0;
+
 /// Settings of the planner.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Cost of the strongest control of the actions, in units of the cost of being at a limit, above 0.
     pub control_weight: f64,
-    /// Factor on the length of all simulations, above 0; 1 is the thorough search.
+    /// Factor on the length of all simulations, above 0, at most [`MOST_EFFORT`]; 1 is the thorough search.
     pub effort: f64,
     /// Seed of every random number.
     pub seed: u64,
@@ -322,15 +325,27 @@ fn groups_of_levels(mdp: &BeliefMdp) -> Vec<planes::Group> {
 }
 
 fn check(mdp: &BeliefMdp, settings: &Settings) -> Result<()> {
-    for (setting, value) in [
-        ("control_weight", settings.control_weight),
-        ("effort", settings.effort),
+    let positive = |value: f64, most: f64| value > 0.0 && value <= most;
+    let (weight, effort) = (settings.control_weight, settings.effort);
+    for (setting, value, fits, range) in [
+        (
+            "control_weight",
+            weight,
+            positive(weight, f64::MAX),
+            "above 0",
+        ),
+        (
+            "effort",
+            effort,
+            positive(effort, MOST_EFFORT),
+            "above 0, at most 1000",
+        ),
     ] {
-        if !(value > 0.0 && value.is_finite()) {
+        if !fits {
             return Err(Error::Setting {
                 setting,
                 value: value.to_string(),
-                range: "above 0",
+                range,
             });
         }
     }
