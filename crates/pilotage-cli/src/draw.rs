@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use pilotage::belief::BeliefMdp;
 use pilotage::policy::write_whole;
-use pilotage::report::{automaton_svg, belief_map_svg};
+use pilotage_report::{automaton_svg, belief_map_svg};
 
 use crate::failure::Failure;
 use crate::options::{beside, policy_and_problem};

@@ -31,6 +31,16 @@ impl From<pilotage::Error> for Failure {
     }
 }
 
+impl From<pilotage_thesis::Error> for Failure {
+    fn from(error: pilotage_thesis::Error) -> Self {
+        match error {
+            pilotage_thesis::Error::Model(error) => Self::Model(error),
+            pilotage_thesis::Error::Library(error) => Self::Library(error),
+            other => Self::Usage(other.to_string()),
+        }
+    }
+}
+
 impl From<std::io::Error> for Failure {
     fn from(error: std::io::Error) -> Self {
         if error.kind() == std::io::ErrorKind::BrokenPipe {

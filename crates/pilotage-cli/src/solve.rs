@@ -7,13 +7,13 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use pilotage::model::WallBelief;
 use pilotage::policy::write_whole;
-use pilotage::report::{returns_svg, values_svg};
 use pilotage::scenario::{self, Scenario, Walls};
 use pilotage::simulate::{Estimate, Evaluation as Earned};
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
 use pilotage::solve::lqg::Weights;
 use pilotage::solve::{Form, Solution, SolveSettings, SolverKind, solve};
 use pilotage::solve::{arkaq, kafaq};
+use pilotage_report::{returns_svg, values_svg};
 use serde_json::json;
 
 use crate::failure::Failure;

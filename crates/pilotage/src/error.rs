@@ -70,6 +70,18 @@ pub enum Error {
         /// What is wrong with it.
         reason: String,
     },
+    /// A number that has to be finite is not.
+    #[error("{what} is {value} ({place}): {remedy}")]
+    NotFinite {
+        /// The number, in words.
+        what: String,
+        /// The number.
+        value: f64,
+        /// Where it was met.
+        place: String,
+        /// What to change.
+        remedy: &'static str,
+    },
     /// The problem needs more memory than is allowed.
     #[error(
         "{model} needs a grid of {points} points ({mebibytes} MiB), more than the {limit} MiB allowed; raise --memory or make the grid coarser with --grid"

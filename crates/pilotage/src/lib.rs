@@ -11,7 +11,7 @@
 //! The agent's belief is a Gaussian that a Kalman filter keeps. Its covariances follow from the model alone, so a belief is an
 //! *uncertainty level* and a mean ([`belief`]). Solvers ([`solve`]) find what to do at every belief; what they find becomes an
 //! automaton ([`policy`]) that runs without allocating and that can be saved, read and drawn. Data flows one way:
-//! [`model`], [`belief`], [`solve`], [`policy`], [`simulate`], `report`; what is true is a [`world`], into which no agent looks.
+//! [`model`], [`belief`], [`solve`], [`policy`], [`simulate`]; what is true is a [`world`], into which no agent looks.
 //!
 //! ```
 //! use pilotage::{observe::Silent, scenario, simulate::Options};
@@ -34,11 +34,9 @@ pub mod belief;
 pub mod error;
 pub mod model;
 pub mod observe;
-mod parallel;
+pub mod parallel;
 pub mod policy;
 pub mod random;
-#[cfg(feature = "report")]
-pub mod report;
 pub mod scenario;
 pub mod simulate;
 pub mod solve;

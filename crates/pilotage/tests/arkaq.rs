@@ -12,7 +12,6 @@ use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::arkaq::{self, Learned, Run, Settings};
 use pilotage::solve::kbvi::closed;
-use pilotage::solve::yardstick::yardsticks;
 use pilotage::world::{ProblemWorld, World};
 
 const OPTIONS: Options = Options {
@@ -205,36 +204,6 @@ fn vigilance_that_tunes_itself_stops_at_the_limit_and_keeps_the_best() {
             .iter()
             .all(|point| point.vigilance < 0.95)
     );
-}
-
-/// Two docks, and which way the shuttle faces is to be told from the last three steps.
-#[test]
-fn a_longer_memory_finds_which_way_the_shuttle_faces_and_merges_into_a_handful_of_states() {
-    let scenario = scenario("shuttle");
-    let short = Settings {
-        lambda: 0.9,
-        ..at(0.5)
-    };
-    let long = Settings {
-        depth: 3,
-        state_limit: 1_000,
-        merge: true,
-        ..short.clone()
-    };
-    let told = closed::Settings::default();
-    let options = Options {
-        episodes: 2_000,
-        ..OPTIONS
-    };
-    let best = yardsticks(&scenario, &told, options, &Silent).unwrap()[0].earned;
-    let share = |learned: &Learned| {
-        earned(&scenario, &learned.automaton).discounted.mean / best.discounted.mean
-    };
-    let (short, long) = (learn(&scenario, &short), learn(&scenario, &long));
-    let (one, three) = (share(&short), share(&long));
-    assert!(three >= 0.85 && three > 1.5 * one, "{one} and {three}");
-    let nodes = long.automaton.nodes.len();
-    assert!(10 * nodes < long.learning.states, "{nodes}");
 }
 
 #[test]

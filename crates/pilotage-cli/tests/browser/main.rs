@@ -13,9 +13,10 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use devtools::Tab;
 use pilotage::observe::Silent;
-use pilotage::report::{
-    Algorithm, Figure, Finding, Report, Series, Table, Verdict, curves_svg, episodes, page_html,
+use pilotage_report::{
+    Algorithm, Figure, Finding, Report, Series, Table, Verdict, curves_svg, page_html,
 };
+use pilotage_thesis::episodes;
 use serde_json::{Value, json};
 
 /// All that a page can hold: every verdict, wide tables, wide figures, texts that look like markup, long words.

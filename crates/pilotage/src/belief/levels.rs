@@ -6,7 +6,7 @@
 
 use nalgebra::DMatrix;
 
-use super::kalman::{Correction, distance};
+use super::kalman::{Correction, distance, square_root};
 use super::riccati::steady_state;
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Model};
@@ -33,6 +33,8 @@ pub struct NoiseClass {
 pub struct LevelStep {
     /// The level it leads to.
     pub next: LevelId,
+    /// Whether there was no room for the level it should lead to, and `next` is the closest there is.
+    pub cut: bool,
     /// Gain, innovation covariance and the rest of the step.
     pub correction: Correction,
 }
@@ -41,6 +43,12 @@ pub struct LevelStep {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelGraph {
     covariances: Vec<DMatrix<f64>>,
+    /// By level: the step of an episode at which it is held, no more than `clock`.
+    times: Vec<usize>,
+    /// The step from which on levels no longer tell the time.
+    clock: usize,
+    /// Whether an episode is over at the clock's last step.
+    ends: bool,
     /// Levels at which a class has come to rest.
     settled: Vec<bool>,
     classes: Vec<NoiseClass>,
@@ -59,13 +67,23 @@ impl LevelGraph {
     /// reaches is the steady one and repeats itself, at the exact solution of the Riccati equation where there is one. (With
     /// tolerance 5e-7 this is the counting rule that gives Table 4.1.) Other covariances within the tolerance of a level
     /// already found are that level.
+    ///
+    /// Where something in the model changes with the step of an episode, levels are told apart by the step at which they are held, up
+    /// to the model's clock.
     pub fn new(model: &Model, starts: &[DMatrix<f64>]) -> Self {
+        Self::within(model, starts, None)
+    }
+
+    /// The same for episodes of so many steps: levels tell the time up to the last, at which they are over.
+    pub fn within(model: &Model, starts: &[DMatrix<f64>], horizon: Option<usize>) -> Self {
         let mut graph = Self::with_classes(model);
+        graph.clock = horizon.unwrap_or_else(|| model.clock());
+        graph.ends = horizon.is_some();
         let tolerance = model.belief.level_tolerance;
         for start in starts {
             let level = graph
-                .nearest(start, tolerance)
-                .unwrap_or_else(|| graph.add(start.clone()));
+                .nearest(start, tolerance, 0)
+                .unwrap_or_else(|| graph.add(start.clone(), 0));
             graph.starts.push(level);
         }
         let mut level = 0;
@@ -98,6 +116,9 @@ impl LevelGraph {
             .collect();
         Self {
             covariances: Vec::new(),
+            times: Vec::new(),
+            clock: 0,
+            ends: false,
             settled: Vec::new(),
             classes,
             class_of_action,
@@ -119,21 +140,39 @@ impl LevelGraph {
             sensor_noise,
             &self.covariances[level],
         );
-        let tolerance = model.belief.level_tolerance;
-        let next = match self.nearest(&correction.covariance, tolerance) {
+        let (next, cut) = self.lead(model, level, class, &correction.covariance);
+        LevelStep {
+            next,
+            cut,
+            correction,
+        }
+    }
+
+    /// The level that a step of a class leads to, with the covariance it leaves, and whether there was no room for it.
+    fn lead(
+        &mut self,
+        model: &Model,
+        level: LevelId,
+        class: ClassId,
+        covariance: &DMatrix<f64>,
+    ) -> (LevelId, bool) {
+        if self.is_over(level) {
+            return (level, false);
+        }
+        let time = (self.times[level] + 1).min(self.clock);
+        match self.nearest(covariance, model.belief.level_tolerance, time) {
             Some(found) if found == level && !self.settled[level] => {
-                self.settle(model, class, &correction.covariance)
+                (self.settle(model, class, covariance), false)
             }
-            Some(found) => found,
-            None if self.covariances.len() < model.belief.level_limit => {
-                self.add(correction.covariance.clone())
+            Some(found) => (found, false),
+            None if self.held_at(time) < model.belief.level_limit => {
+                (self.add(covariance.clone(), time), false)
             }
             None => {
                 self.converged = false;
-                level
+                (self.closest(covariance, time).unwrap_or(level), true)
             }
-        };
-        LevelStep { next, correction }
+        }
     }
 
     /// The steady level of a class whose covariance no longer changes by more than the tolerance.
@@ -145,21 +184,33 @@ impl LevelGraph {
         let steady = steady_state(&model.motion.a, motion_noise, &model.sensor.h, sensor_noise)
             .unwrap_or_else(|_| covariance.clone());
         let steady = self
-            .nearest(&steady, SAME)
-            .unwrap_or_else(|| self.add(steady));
+            .nearest(&steady, SAME, self.clock)
+            .unwrap_or_else(|| self.add(steady, self.clock));
         self.settled[steady] = true;
         steady
     }
 
-    fn add(&mut self, covariance: DMatrix<f64>) -> LevelId {
+    fn add(&mut self, covariance: DMatrix<f64>, time: usize) -> LevelId {
         self.covariances.push(covariance);
+        self.times.push(time);
         self.settled.push(false);
         self.steps.push(Vec::with_capacity(self.classes.len()));
         self.covariances.len() - 1
     }
 
-    fn nearest(&self, covariance: &DMatrix<f64>, tolerance: f64) -> Option<LevelId> {
+    /// Number of levels that are held at a time.
+    fn held_at(&self, time: usize) -> usize {
+        self.times.iter().filter(|known| **known == time).count()
+    }
+
+    /// The level closest to a covariance among those held at a time.
+    fn closest(&self, covariance: &DMatrix<f64>, time: usize) -> Option<LevelId> {
+        self.nearest(covariance, f64::INFINITY, time)
+    }
+
+    fn nearest(&self, covariance: &DMatrix<f64>, tolerance: f64, time: usize) -> Option<LevelId> {
         (0..self.covariances.len())
+            .filter(|&level| self.times[level] == time)
             .map(|level| (level, distance(covariance, &self.covariances[level])))
             .filter(|&(_, distance)| distance <= tolerance)
             .min_by(|a, b| a.1.total_cmp(&b.1))
@@ -179,6 +230,28 @@ impl LevelGraph {
     /// Covariance of a level, `n x n`.
     pub fn covariance(&self, level: LevelId) -> &DMatrix<f64> {
         &self.covariances[level]
+    }
+
+    /// The step of an episode at which a level is held; where nothing changes with the step any more, the first of those steps.
+    pub fn time(&self, level: LevelId) -> usize {
+        self.times[level]
+    }
+
+    /// Whether an episode is over at a level.
+    pub fn is_over(&self, level: LevelId) -> bool {
+        self.ends && self.times[level] == self.clock
+    }
+
+    /// Covariance of the next mean around its prediction after a step of a class: `K S K'`. Where levels were cut, what the step
+    /// would leave of the uncertainty is not what the level it leads to has, and the mean moves by the difference that is true of these
+    /// two, `P- - P`, so that looking is not worth more than it tells.
+    pub fn spread(&self, level: LevelId, class: ClassId) -> DMatrix<f64> {
+        let step = &self.steps[level][class];
+        if !step.cut {
+            return step.correction.spread();
+        }
+        let root = square_root(&(&step.correction.predicted - &self.covariances[step.next]));
+        &root * root.transpose()
     }
 
     /// The noise classes.
@@ -216,7 +289,9 @@ impl LevelGraph {
         }
         for (id, class) in self.classes.iter().enumerate() {
             let grows = (0..self.len()).any(|level| {
-                let LevelStep { next, correction } = &self.steps[level][id];
+                let LevelStep {
+                    next, correction, ..
+                } = &self.steps[level][id];
                 *next == level && correction.covariance.trace() > self.covariances[level].trace()
             });
             let steady = steady_state(

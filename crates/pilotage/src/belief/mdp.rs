@@ -1,16 +1,18 @@
 //! The belief decision process: the planner's view of a model.
 //!
 //! Its state is a belief `(mode, level, mean)`. An action moves the mean to `A m + B u + K nu` with innovation
-//! `nu ~ N(0, S)` and the level along the level graph; it earns the expected reward of Eq. 5.2.
+//! `nu ~ N(0, S)` and the level along the level graph; it earns the expected reward of Eq. 5.2. What a step does is said by the
+//! model's effects, whose regions the belief integrates over.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::filter::{Belief, Filter};
-use super::gaussian::region_probability;
+use super::gaussian::{interval_probability, region_probability};
 use super::levels::{LevelGraph, LevelId};
+use super::mixture::Mixture;
 use crate::model::{
-    ActionId, Barriers, Event, HypothesisBelief, Interval, Map, ModeId, Model, Region, Reward,
-    Then, WallBelief, When,
+    ActionId, Barriers, Effect, HypothesisBelief, Interval, Map, ModeId, Model, Outcome, Region,
+    Then, WallBelief, When, apart,
 };
 
 /// A model together with its uncertainty levels and the way a belief is read.
@@ -21,53 +23,38 @@ pub struct BeliefMdp {
     starts: Vec<(f64, Belief)>,
     walls: Option<Barriers>,
     reading: Reading,
-    /// Rewards and events as the belief reads them: their regions pushed beyond the walls it knows of, without those in places
-    /// where no state can be.
-    rewards: Vec<Reward>,
-    events: Vec<Event>,
-    /// The start hypotheses, where they are points that do not move.
-    points: Option<Points>,
+    /// What a step can do, by its time up to the model's clock, then mode and action. Regions are as the belief reads them: pushed
+    /// beyond the walls it knows of, without those in places where no state can be, and events apart.
+    effects: Vec<Vec<Vec<Vec<Effect>>>>,
+    /// The start hypotheses, where one filter keeps them all.
+    mixture: Option<Mixture>,
 }
 
 /// What a filter's `(level, mean)` says about the true state.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Reading {
     /// The state is N(mean, P).
     Gaussian,
     /// As `Gaussian`, with everything beyond the bounds sitting at the bounds.
     Clipped,
-    /// The state is one of a few points that do not move, and the filter only keeps score of them.
-    Points,
-}
-
-/// Hypotheses that are points. The Gaussian filter is a sufficient statistic of their weights:
-/// `log w_i = log w_i(0) + x_i' y - x_i' Y x_i / 2`, with the information gained `y = P^-1 m - P_0^-1 m_0`, `Y = P^-1 - P_0^-1`.
-/// For the tiger at -1 or +1 the log-odds are `2 m / P`.
-#[derive(Debug, Clone)]
-struct Points {
-    positions: Vec<DVector<f64>>,
-    log_priors: Vec<f64>,
-    /// Per level `P^-1`, and `P_0^-1 m_0`, `P_0^-1`.
-    information: Vec<DMatrix<f64>>,
-    prior_vector: DVector<f64>,
-    prior_information: DMatrix<f64>,
-}
-
-/// One thing that can happen to mode and episode when an action is taken.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
-    /// Its probability; those of one action sum to 1.
-    pub probability: f64,
-    /// Mode afterwards.
-    pub mode: ModeId,
-    /// What it does to the episode.
-    pub then: Then,
+    /// The state is distributed as a mixture of the start hypotheses.
+    Mixture,
 }
 
 impl BeliefMdp {
     /// The decision process of a model. Several start hypotheses are taken as one Gaussian with their mean and covariance, unless
     /// each is tracked on its own.
     pub fn new(model: &Model) -> Self {
+        Self::within(model, None)
+    }
+
+    /// The same for episodes that are over after so many steps: levels are then told apart by the step at which they are held, and
+    /// the last ones are over.
+    pub fn with_horizon(model: &Model, steps: usize) -> Self {
+        Self::within(model, Some(steps))
+    }
+
+    fn within(model: &Model, horizon: Option<usize>) -> Self {
         let tracked = model.belief.hypotheses == HypothesisBelief::Track;
         let (mean, covariance) = moments(model);
         let gaussians: Vec<_> = match tracked {
@@ -79,7 +66,7 @@ impl BeliefMdp {
             false => vec![(1.0, model.start[0].mode, &mean, &covariance)],
         };
         let covariances: Vec<_> = gaussians.iter().map(|start| start.3.clone()).collect();
-        let levels = LevelGraph::new(model, &covariances);
+        let levels = LevelGraph::within(model, &covariances, horizon);
         let starts = gaussians
             .iter()
             .zip(levels.starts())
@@ -88,39 +75,39 @@ impl BeliefMdp {
                 (weight, Belief { level, mode, mean })
             })
             .collect();
-        let points = are_points(model).then(|| Points::new(model, &levels, &mean));
+        let mixture = Mixture::of(model, &levels, &mean);
         let reading = match (model.belief.hypotheses, model.belief.walls) {
-            (HypothesisBelief::Collapse, _) if points.is_some() => Reading::Points,
+            (HypothesisBelief::Collapse, _) if mixture.is_some() => Reading::Mixture,
             (_, WallBelief::Clip) => Reading::Clipped,
             _ => Reading::Gaussian,
         };
-        let read = |region: &Region| match reading {
-            Reading::Clipped => beyond_walls(model, region),
-            _ => Some(region.clone()),
+        let read = |effect: Effect| match reading {
+            Reading::Clipped => Some(Effect {
+                region: beyond_walls(model, &effect.region)?,
+                ..effect
+            }),
+            _ => Some(effect),
         };
-        let rewards = model.rewards.iter().filter_map(|reward| {
-            let region = read(&reward.region)?;
-            Some(Reward {
-                region,
-                ..reward.clone()
-            })
-        });
-        let events = model.events.iter().filter_map(|event| {
-            let region = read(&event.region)?;
-            Some(Event {
-                region,
-                ..event.clone()
-            })
-        });
+        let effects = |time| {
+            let of = |mode, action| {
+                let effects = model.effects(mode, action, time);
+                apart(effects.into_iter().filter_map(read).collect())
+            };
+            let of_mode = |mode| {
+                (0..model.actions.len())
+                    .map(|action| of(mode, action))
+                    .collect()
+            };
+            (0..model.modes.len()).map(of_mode).collect()
+        };
         Self {
-            rewards: rewards.collect(),
-            events: events.collect(),
+            effects: (0..=model.clock()).map(effects).collect(),
             model: model.clone(),
             levels,
             starts,
             walls: (model.belief.walls == WallBelief::Clip).then(|| Barriers::new(model)),
             reading,
-            points,
+            mixture,
         }
     }
 
@@ -156,25 +143,34 @@ impl BeliefMdp {
 
     /// Whether a belief is read as the one Gaussian N(mean, P).
     pub fn is_gaussian(&self) -> bool {
-        matches!(self.reading, Reading::Gaussian)
+        self.reading == Reading::Gaussian
     }
 
-    /// Weight and position of each start hypothesis at a belief, where they are points that do not move.
-    pub fn hypotheses(&self, level: LevelId, mean: &[f64]) -> Option<Vec<(f64, &DVector<f64>)>> {
-        self.points.as_ref().map(|points| {
-            points
-                .weights(level, mean)
-                .into_iter()
-                .zip(&points.positions)
-                .collect()
-        })
+    /// Whether one filter keeps a belief exactly: nothing the model says about state and mode is lost in `(mode, level, mean)`.
+    pub fn is_exact(&self) -> bool {
+        self.reading != Reading::Clipped
+            && self.model.modes.len() == 1
+            && (self.model.start.len() == 1 || self.reading == Reading::Mixture)
+            && self.model.episode.alive.sides.is_empty()
+            && self.levels.converged()
+    }
+
+    /// Weight and mean of each start hypothesis at a belief, where one filter keeps them all.
+    pub fn hypotheses(&self, level: LevelId, mean: &[f64]) -> Option<Vec<(f64, DVector<f64>)>> {
+        let mixture = self.mixture.as_ref()?;
+        Some(mixture.hypotheses(level, mean))
     }
 
     /// The hypotheses, where a belief is read as them.
-    fn read_as_points(&self) -> Option<&Points> {
-        self.points
-            .as_ref()
-            .filter(|_| matches!(self.reading, Reading::Points))
+    fn read_as_mixture(&self) -> Option<&Mixture> {
+        let mixture = self.mixture.as_ref();
+        mixture.filter(|_| self.reading == Reading::Mixture)
+    }
+
+    /// What an action can do in a mode at a level, with regions as the belief reads them.
+    pub fn effects(&self, mode: ModeId, level: LevelId, action: ActionId) -> &[Effect] {
+        let time = self.levels.time(level).min(self.effects.len() - 1);
+        &self.effects[time][mode][action]
     }
 
     /// Probability that the true state lies in the region (Eq. 5.2, exact).
@@ -188,21 +184,14 @@ impl BeliefMdp {
 
     /// As [`BeliefMdp::probability`], for a region as the belief reads it.
     fn mass(&self, level: LevelId, mean: &[f64], region: &Region) -> f64 {
-        if let Some(points) = self.read_as_points() {
-            let weights = points.weights(level, mean);
-            return weights
-                .iter()
-                .zip(&points.positions)
-                .filter(|(_, x)| region.contains(x.as_slice()))
-                .map(|(w, _)| w)
-                .sum();
-        }
-        region_probability(mean, self.levels.covariance(level), region)
+        self.averaged(level, mean, |mean, covariance| {
+            region_probability(mean, covariance, region)
+        })
     }
 
     /// Probability that the true state lies in the region when the step asks for it. After the move it lies where the filter
     /// predicts it, N(A m + B u, P-).
-    fn chance(
+    fn holds(
         &self,
         level: LevelId,
         mean: &[f64],
@@ -213,7 +202,7 @@ impl BeliefMdp {
         if when == When::After && self.model.actions[action].then != Then::Continue {
             return 0.0;
         }
-        if when == When::Before || self.read_as_points().is_some() {
+        if when == When::Before || self.read_as_mixture().is_some() {
             return self.mass(level, mean, region);
         }
         let predicted = self.predicted(mean, action);
@@ -229,36 +218,99 @@ impl BeliefMdp {
         self.stop(mean, moved)
     }
 
-    /// Probability that the true state has left what [`crate::model::Episode::alive`] allows.
-    pub fn failure(&self, level: LevelId, mean: &[f64]) -> f64 {
+    /// Probability that the true state leaves what [`crate::model::Episode::alive`] allows in the step that an action takes, of an agent
+    /// that has not failed: now the state is within all limits, and the filter does not know it.
+    ///
+    /// Counting the probability of being outside afresh at every step would count the same error of the estimate over and over.
+    pub fn failure(&self, level: LevelId, mean: &[f64], action: ActionId) -> f64 {
         let alive = &self.model.episode.alive;
-        if alive.sides.is_empty() {
+        if alive.sides.is_empty() || self.model.actions[action].then != Then::Continue {
             return 0.0;
         }
-        (1.0 - self.probability(level, mean, alive)).max(0.0)
+        let (a, covariance) = (&self.model.motion.a, self.levels.covariance(level));
+        let step = self.levels.step(level, self.levels.class_of(action));
+        let predicted = self.predicted(mean, action);
+        let carried = a * covariance;
+        let stays = alive.sides.iter().map(|&(i, side)| {
+            let later = (predicted[i], step.correction.predicted[(i, i)]);
+            stays((mean[i], covariance[(i, i)]), later, carried[(i, i)], side)
+        });
+        1.0 - stays.product::<f64>()
     }
 
-    /// Expected immediate reward `r(b, a)`, events included; that of failing is not, see [`BeliefMdp::failure`].
+    /// Expected immediate reward `r(b, a)`, events included, and what the action can do to mode and episode. The reward of failing is
+    /// not counted, see [`BeliefMdp::failure`].
+    pub fn step(
+        &self,
+        mode: ModeId,
+        level: LevelId,
+        mean: &[f64],
+        action: ActionId,
+    ) -> (f64, Vec<Outcome>) {
+        let mut tally = self.model.tally(mode, action);
+        let mut outcomes: Vec<Outcome> = Vec::new();
+        let mut add = |outcome: Outcome| {
+            let same =
+                |known: &&mut Outcome| (known.mode, known.then) == (outcome.mode, outcome.then);
+            match outcomes.iter_mut().find(same) {
+                Some(known) => known.probability += outcome.probability,
+                None if outcome.probability > 0.0 => outcomes.push(outcome),
+                None => {}
+            }
+        };
+        for effect in self.effects(mode, level, action) {
+            let holds = self.holds(level, mean, action, &effect.region, effect.when);
+            if let Some(outcome) = tally.take(effect, holds) {
+                add(outcome);
+            }
+        }
+        add(tally.rest());
+        (
+            tally.reward + self.running_cost(level, mean, action),
+            outcomes,
+        )
+    }
+
+    /// Expected cost of a step, as a negative reward.
+    fn running_cost(&self, level: LevelId, mean: &[f64], action: ActionId) -> f64 {
+        self.averaged(level, mean, |mean, covariance| {
+            self.model.running_cost(mean, Some(covariance), action)
+        })
+    }
+
+    /// Expected cost of ending an episode, as a negative reward.
+    pub fn terminal_cost(&self, level: LevelId, mean: &[f64]) -> f64 {
+        self.averaged(level, mean, |mean, covariance| {
+            self.model.terminal_cost(mean, Some(covariance))
+        })
+    }
+
+    /// Average of something that is known of a Gaussian.
+    fn averaged(
+        &self,
+        level: LevelId,
+        mean: &[f64],
+        of: impl Fn(&[f64], &DMatrix<f64>) -> f64,
+    ) -> f64 {
+        match self.read_as_mixture() {
+            None => of(mean, self.levels.covariance(level)),
+            Some(mixture) => {
+                let covariance = mixture.covariance(level);
+                let hypotheses = mixture.hypotheses(level, mean);
+                hypotheses
+                    .iter()
+                    .map(|(weight, x)| weight * of(x.as_slice(), covariance))
+                    .sum()
+            }
+        }
+    }
+
+    /// Expected immediate reward `r(b, a)`, see [`BeliefMdp::step`].
     pub fn reward(&self, mode: ModeId, level: LevelId, mean: &[f64], action: ActionId) -> f64 {
-        let rewards = self
-            .rewards
-            .iter()
-            .filter(|reward| reward.applies(mode, action));
-        let paid: f64 = rewards
-            .map(|reward| {
-                reward.value * self.chance(level, mean, action, &reward.region, reward.when)
-            })
-            .sum();
-        let events = self
-            .events
-            .iter()
-            .filter(|event| event.applies(mode, action));
-        paid + events
-            .map(|event| event.reward * self.chance(level, mean, action, &event.region, event.when))
-            .sum::<f64>()
+        self.step(mode, level, mean, action).0
     }
 
-    /// What the action can do to mode and episode. Events whose regions overlap share probability in file order.
+    /// What the action can do to mode and episode, see [`BeliefMdp::step`].
     pub fn outcomes(
         &self,
         mode: ModeId,
@@ -266,40 +318,11 @@ impl BeliefMdp {
         mean: &[f64],
         action: ActionId,
     ) -> Vec<Outcome> {
-        let ends = self.model.actions[action].then;
-        let mut left = 1.0;
-        let mut outcomes = Vec::new();
-        let of = |when| {
-            let events = self.events.iter();
-            events.filter(move |event| event.when == when && event.applies(mode, action))
-        };
-        for event in of(When::Before).chain(of(When::After)) {
-            let probability = self
-                .chance(level, mean, action, &event.region, event.when)
-                .min(left);
-            left -= probability;
-            let then = if ends == Then::Continue {
-                event.then
-            } else {
-                ends
-            };
-            outcomes.push(Outcome {
-                probability,
-                mode: event.becomes.unwrap_or(mode),
-                then,
-            });
-        }
-        outcomes.push(Outcome {
-            probability: left,
-            mode,
-            then: ends,
-        });
-        outcomes.retain(|outcome| outcome.probability > 0.0);
-        outcomes
+        self.step(mode, level, mean, action).1
     }
 
-    /// Where the next mean is centred, with which weight: the predicted mean `A m + B u`, moved by what each component makes
-    /// the agent observe. The innovation's own noise has covariance [`BeliefMdp::spread`] around it.
+    /// Where the next mean is centred, with which weight: the predicted mean `A m + B u`, moved by what each hypothesis makes the
+    /// agent observe. The innovation's own noise has covariance [`BeliefMdp::spread`] around it.
     pub fn centres(
         &self,
         level: LevelId,
@@ -307,31 +330,31 @@ impl BeliefMdp {
         action: ActionId,
     ) -> Vec<(f64, DVector<f64>)> {
         let predicted = self.predicted(mean, action);
-        let Some(points) = self.read_as_points() else {
+        let Some(mixture) = self.read_as_mixture() else {
             return vec![(1.0, predicted)];
         };
-        let gain = &self
-            .levels
-            .step(level, self.levels.class_of(action))
-            .correction
-            .gain;
-        let moved = points
-            .positions
-            .iter()
-            .map(|x| &predicted + gain * &self.model.sensor.h * (x - &predicted));
-        points.weights(level, mean).into_iter().zip(moved).collect()
+        let class = self.levels.class_of(action);
+        let gain = &self.levels.step(level, class).correction.gain;
+        let mut centres = mixture.hypotheses(level, mean);
+        for (_, x) in &mut centres {
+            *x = &predicted + gain * &self.model.sensor.h * (&*x - &predicted);
+        }
+        centres
     }
 
-    /// Covariance of the next mean around its centre after an action of this class: `K S K'` (Eq. 5.6, corrected), or
-    /// `K R K'` where the component fixes the state.
+    /// Covariance of the next mean around its centre after an action of this class: `K S K'` (Eq. 5.6, corrected); for a mixture
+    /// with the `S` of each of its hypotheses.
     pub fn spread(&self, level: LevelId, class: usize) -> DMatrix<f64> {
-        let correction = &self.levels.step(level, class).correction;
-        if self.read_as_points().is_some() {
-            return &correction.gain
-                * &self.levels.classes()[class].sensor_noise
-                * correction.gain.transpose();
+        let step = self.levels.step(level, class);
+        match self.read_as_mixture() {
+            None => self.levels.spread(level, class),
+            Some(mixture) => {
+                let (gain, h) = (&step.correction.gain, &self.model.sensor.h);
+                let noise = &self.levels.classes()[class].sensor_noise;
+                let innovation = h * mixture.covariance(level) * h.transpose() + noise;
+                gain * innovation * gain.transpose()
+            }
         }
-        correction.spread()
     }
 
     /// Bounds on the reward of one step, over all beliefs and actions, that of failing included: smallest, largest.
@@ -410,55 +433,29 @@ fn moments(model: &Model) -> (DVector<f64>, DMatrix<f64>) {
     (mean, covariance)
 }
 
-/// Whether the hypotheses are several points that no action moves.
-fn are_points(model: &Model) -> bool {
-    let n = model.state_dim();
-    model.start.len() > 1
-        && model
-            .start
-            .iter()
-            .all(|start| start.covariance.amax() == 0.0)
-        && model.motion.a == DMatrix::identity(n, n)
-        && (0..model.actions.len()).all(|action| {
-            model.motion_noise(action).amax() == 0.0 && model.displacement(action).amax() == 0.0
-        })
-}
-
-impl Points {
-    fn new(model: &Model, levels: &LevelGraph, mean: &DVector<f64>) -> Self {
-        let inverse = |matrix: &DMatrix<f64>| {
-            matrix
-                .clone()
-                .pseudo_inverse(1e-12 * matrix.amax().max(1e-300))
-                .unwrap_or_else(|_| matrix.clone() * 0.0)
-        };
-        let prior_information = inverse(levels.covariance(levels.starts()[0]));
-        Self {
-            positions: model.start.iter().map(|start| start.mean.clone()).collect(),
-            log_priors: model.start.iter().map(|start| start.weight.ln()).collect(),
-            information: (0..levels.len())
-                .map(|level| inverse(levels.covariance(level)))
-                .collect(),
-            prior_vector: &prior_information * mean,
-            prior_information,
-        }
+/// Probability that a variable is within limits a step later, given that it is now. Mean and variance now and later, and the covariance
+/// of the two.
+fn stays(now: (f64, f64), later: (f64, f64), shared: f64, side: Interval) -> f64 {
+    // So many standard deviations inside its limits a variable leaves them less often than once in 1e11 steps.
+    const NEVER: f64 = 6.7;
+    // Less likely than this an agent is not there to ask.
+    const HARDLY: f64 = 1e-9;
+    let inside = |(mean, variance): (f64, f64)| {
+        let reach = NEVER * f64::sqrt(variance);
+        mean - side.low > reach && side.high - mean > reach
+    };
+    if inside(later) {
+        return 1.0;
     }
-
-    fn weights(&self, level: LevelId, mean: &[f64]) -> Vec<f64> {
-        let vector =
-            &self.information[level] * DVector::from_column_slice(mean) - &self.prior_vector;
-        let matrix = &self.information[level] - &self.prior_information;
-        let scores: Vec<f64> = self
-            .positions
-            .iter()
-            .zip(&self.log_priors)
-            .map(|(x, log_prior)| log_prior + x.dot(&vector) - 0.5 * x.dot(&(&matrix * x)))
-            .collect();
-        let best = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = scores.iter().map(|score| (score - best).exp()).sum();
-        scores
-            .iter()
-            .map(|score| (score - best).exp() / total)
-            .collect()
+    let alive = interval_probability(now.0, now.1, side);
+    if alive < HARDLY {
+        return 0.0;
     }
+    let joint = DMatrix::from_row_slice(2, 2, &[now.1, shared, shared, later.1]);
+    let both = region_probability(
+        &[now.0, later.0],
+        &joint,
+        &Region::new(vec![(0, side), (1, side)]),
+    );
+    (both / alive).clamp(0.0, 1.0)
 }

@@ -6,6 +6,7 @@ pub mod hypotheses;
 pub mod kalman;
 pub mod levels;
 pub mod mdp;
+mod mixture;
 pub mod recall;
 pub mod riccati;
 

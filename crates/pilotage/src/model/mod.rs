@@ -5,6 +5,7 @@
 //! ([`crate::scenario::read`]). What is *true* may differ: that is part of a [`crate::scenario::Scenario`], which no planner sees.
 
 mod barriers;
+mod effects;
 pub(crate) mod error;
 pub(crate) mod map;
 mod region;
@@ -15,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use barriers::Barriers;
+pub use effects::{Change, Effect, Outcome, Tally, apart};
 pub use error::{Fault, ModelError, Path, Place, Step, nearest, suggest};
 pub use map::Map;
 pub use region::{Interval, Region};
@@ -54,7 +56,7 @@ pub struct Model {
     pub rewards: Vec<Reward>,
     /// Events that change the hidden mode. The first that applies happens, at most one a step.
     pub events: Vec<Event>,
-    /// Quadratic cost of state and control, for `lqg`.
+    /// Quadratic cost of state and control.
     pub cost: Option<QuadraticCost>,
     /// Length and failure limits of an episode.
     pub episode: Episode,
@@ -157,6 +159,42 @@ pub enum When {
     After,
 }
 
+/// Some steps of an episode, counted from 0: the first of them, and the first after them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Steps {
+    /// The first step.
+    pub from: usize,
+    /// The first step that is no longer one of them; `usize::MAX` where there is no end.
+    pub until: usize,
+}
+
+impl Steps {
+    /// All steps.
+    pub const ALL: Self = Self {
+        from: 0,
+        until: usize::MAX,
+    };
+
+    /// Whether a step is one of them.
+    pub fn contains(&self, step: usize) -> bool {
+        self.from <= step && step < self.until
+    }
+
+    /// The first step from which on nothing changes any more.
+    fn settled(&self) -> usize {
+        match self.until {
+            usize::MAX => self.from,
+            until => until,
+        }
+    }
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self::ALL
+    }
+}
+
 /// A reward term: paid when the action is taken in the mode, and the state is in the region.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reward {
@@ -168,6 +206,8 @@ pub struct Reward {
     pub region: Region,
     /// Whether it must be there before or after the step. A step that ends or restarts the episode has no after.
     pub when: When,
+    /// Steps of the episode in which it is paid.
+    pub steps: Steps,
     /// Amount, in units of reward.
     pub value: f64,
 }
@@ -183,6 +223,8 @@ pub struct Event {
     pub region: Region,
     /// Whether it must be there before or after the step. Events before come first.
     pub when: When,
+    /// Steps of the episode in which it can happen.
+    pub steps: Steps,
     /// Mode afterwards; `None` leaves it.
     pub becomes: Option<ModeId>,
     /// Paid when it happens.
@@ -191,7 +233,8 @@ pub struct Event {
     pub then: Then,
 }
 
-/// `cost = s' state s + u' control u` a step, `s' terminal s` at the end.
+/// `cost = s' state s + u' control u` a step, `s' terminal s` at the end of the episode. A cost is a negative reward, paid beside
+/// all others when the action is taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuadraticCost {
     /// State weights, `n x n`.
@@ -320,12 +363,6 @@ impl Model {
             })
     }
 
-    /// The model with another belief about walls.
-    pub fn with_walls(mut self, walls: WallBelief) -> Self {
-        self.belief.walls = walls;
-        self
-    }
-
     /// Where something good is paid: the regions of all rewards and events above 0.
     pub fn goals(&self) -> Vec<Region> {
         let rewards = self
@@ -350,14 +387,14 @@ impl Model {
 }
 
 impl Reward {
-    /// Whether the term is paid for this action in this mode (somewhere).
+    /// Whether the term is paid for this action in this mode (somewhere, at some step).
     pub fn applies(&self, mode: ModeId, action: ActionId) -> bool {
         applies(&self.actions, self.mode, mode, action)
     }
 }
 
 impl Event {
-    /// Whether the event can happen on this action in this mode (somewhere).
+    /// Whether the event can happen on this action in this mode (somewhere, at some step).
     pub fn applies(&self, mode: ModeId, action: ActionId) -> bool {
         applies(&self.actions, self.mode, mode, action)
     }

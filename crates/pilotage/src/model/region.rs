@@ -66,6 +66,44 @@ impl Region {
             .iter()
             .all(|&(variable, interval)| interval.contains(state[variable]))
     }
+
+    /// Its interval along a variable.
+    pub fn side(&self, variable: usize) -> Interval {
+        let mut sides = self.sides.iter();
+        let side = sides.find(|(known, _)| *known == variable);
+        side.map_or(Interval::ALL, |(_, interval)| *interval)
+    }
+
+    /// The same region with another interval along a variable.
+    fn with_side(&self, variable: usize, interval: Interval) -> Self {
+        let others = self.sides.iter().filter(|(known, _)| *known != variable);
+        Self::new(others.copied().chain([(variable, interval)]).collect())
+    }
+
+    /// What is left of it without another region, as boxes that do not overlap.
+    pub fn without(&self, other: &Self) -> Vec<Self> {
+        let meets = other.sides.iter().all(|&(variable, side)| {
+            let own = self.side(variable);
+            own.low < side.high && side.low < own.high
+        });
+        if !meets {
+            return vec![self.clone()];
+        }
+        let mut rest = Vec::new();
+        let mut core = self.clone();
+        for &(variable, side) in &other.sides {
+            let own = core.side(variable);
+            if own.low < side.low {
+                rest.push(core.with_side(variable, Interval::new(own.low, side.low)));
+            }
+            if side.high < own.high {
+                rest.push(core.with_side(variable, Interval::new(side.high, own.high)));
+            }
+            let low = own.low.max(side.low);
+            core = core.with_side(variable, Interval::new(low, own.high.min(side.high)));
+        }
+        rest
+    }
 }
 
 /// JSON has no infinity: it is written as text.

@@ -32,3 +32,14 @@ pub trait Policy: Send + Sync {
         None
     }
 }
+
+/// Index of the largest value; of values equal but for rounding, the first.
+pub(crate) fn first_best(values: &[f64]) -> usize {
+    let mut best = 0;
+    for (index, &value) in values.iter().enumerate() {
+        if value > values[best] + 1e-12 * values[best].abs().max(1.0) {
+            best = index;
+        }
+    }
+    best
+}

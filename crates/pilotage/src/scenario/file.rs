@@ -164,6 +164,9 @@ pub(super) struct RewardTable {
     /// Whether the state must be there before or after the move. Default: before.
     #[serde(default)]
     pub when: When,
+    /// The steps of an episode in which it is paid. Default: all.
+    #[serde(default)]
+    pub steps: StepsTable,
     /// Amount.
     pub value: f64,
 }
@@ -182,6 +185,9 @@ pub(super) struct EventTable {
     /// Whether the state must be there before or after the move; events before come first. Default: before.
     #[serde(default)]
     pub when: When,
+    /// The steps of an episode in which it can happen. Default: all.
+    #[serde(default)]
+    pub steps: StepsTable,
     /// The mode afterwards. Default: as before.
     pub becomes: Option<String>,
     /// Paid when it happens. Default: 0.
@@ -190,6 +196,17 @@ pub(super) struct EventTable {
     /// What it does to the episode. Default: the episode goes on.
     #[serde(default)]
     pub then: Then,
+}
+
+/// Some steps of an episode, counted from 0.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct StepsTable {
+    /// The first of them. Default: 0.
+    #[serde(default)]
+    pub from: u64,
+    /// The first step after them. Default: there is none.
+    pub until: Option<u64>,
 }
 
 /// Quadratic cost: s' state s + u' control u a step, s' terminal s at the end of the episode.

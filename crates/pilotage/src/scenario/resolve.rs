@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::file::{
     ActionTable, ControlTable, EventTable, Kind, ModelFile, Plant, RewardTable, Rows, StartTable,
-    StateTable, WorldMotionTable,
+    StateTable, StepsTable, WorldMotionTable,
 };
 use super::file_value::{Ends, OneOrMany, Sides, Where};
 use super::*;
@@ -191,6 +191,7 @@ impl Names {
         let actions = self.action_list(&table.action, path)?;
         let mode = self.mode(&table.mode, path.clone().key("mode"))?;
         let regions = self.regions(&table.place, path)?;
+        let steps = steps(&table.steps, path)?;
         Ok(regions
             .into_iter()
             .map(|region| Reward {
@@ -198,6 +199,7 @@ impl Names {
                 mode,
                 region,
                 when: table.when,
+                steps,
                 value: table.value,
             })
             .collect())
@@ -208,6 +210,7 @@ impl Names {
         let mode = self.mode(&table.mode, path.clone().key("mode"))?;
         let becomes = self.mode(&table.becomes, path.clone().key("becomes"))?;
         let regions = self.regions(&table.place, path)?;
+        let steps = steps(&table.steps, path)?;
         Ok(regions
             .into_iter()
             .map(|region| Event {
@@ -215,6 +218,7 @@ impl Names {
                 mode,
                 region,
                 when: table.when,
+                steps,
                 becomes,
                 reward: table.reward,
                 then: table.then,
@@ -533,6 +537,24 @@ fn belief(file: &ModelFile) -> BeliefSettings {
         walls: table.walls,
         hypotheses: table.hypotheses,
     }
+}
+
+fn steps(table: &StepsTable, path: &Path) -> Result<Steps, Fault> {
+    let steps = Steps {
+        from: saturating(table.from),
+        until: table.until.map_or(usize::MAX, saturating),
+    };
+    if steps.from >= steps.until {
+        return Err(Fault::new(
+            path.clone().key("steps"),
+            format!(
+                "no step from {} on comes before step {}",
+                steps.from, steps.until
+            ),
+            "make `until` larger than `from`: it is the first step after them",
+        ));
+    }
+    Ok(steps)
 }
 
 fn saturating(count: u64) -> usize {

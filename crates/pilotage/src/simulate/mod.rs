@@ -47,7 +47,8 @@ pub struct Moment<'a> {
 
 /// Runs one episode of at most `length` steps. `observation` is a buffer for the sensor's `m` readings.
 ///
-/// The order is that of POMDPs.jl: stop if the episode is over, act, collect the discounted reward, then update the belief.
+/// The order is that of POMDPs.jl: stop if the episode is over, act, collect the discounted reward, then update the belief. What ending costs is
+/// paid after the last step.
 pub fn run_episode(
     world: &mut dyn World,
     agent: &mut dyn Agent,
@@ -92,5 +93,8 @@ pub fn run_episode(
             break;
         }
     }
+    let ending = world.ending();
+    episode.discounted += weight * ending;
+    episode.undiscounted += ending;
     episode
 }

@@ -39,6 +39,8 @@ pub struct Axis {
     pub step: f64,
     /// Number of points, at least 2.
     pub count: usize,
+    /// Where points must be met to the last digit: a coordinate among them, its number, a length, and how many steps that is.
+    lattice: Option<(f64, usize, f64, usize)>,
 }
 
 impl Axis {
@@ -48,6 +50,34 @@ impl Axis {
             low,
             step: (high - low) / (count - 1) as f64,
             count,
+            lattice: None,
+        }
+    }
+
+    /// The same points, with so many times as many steps between them.
+    pub fn finer(&self, factor: usize) -> Self {
+        let lattice = self
+            .lattice
+            .map(|(place, number, length, parts)| (place, number * factor, length, parts * factor));
+        Self {
+            low: self.low,
+            step: self.step / factor as f64,
+            count: (self.count - 1) * factor + 1,
+            lattice,
+        }
+    }
+
+    /// The same stretch, with points at `place` and at every multiple of `length` (above 0) from it; no fewer than before.
+    pub fn through(&self, place: f64, length: f64) -> Self {
+        let parts = (length / self.step).ceil().max(1.0);
+        let step = length / parts;
+        let before = ((place - self.low) / step).ceil().max(0.0);
+        let after = ((self.at(self.count - 1) - place) / step).ceil().max(0.0);
+        Self {
+            low: place - before * step,
+            step,
+            count: (before + after) as usize + 1,
+            lattice: Some((place, before as usize, length, parts as usize)),
         }
     }
 
@@ -60,7 +90,12 @@ impl Axis {
 
     /// Coordinate of a point.
     pub fn at(&self, index: usize) -> f64 {
-        self.low + self.step * index as f64
+        match self.lattice {
+            None => self.low + self.step * index as f64,
+            Some((place, number, length, parts)) => {
+                place + length * (index as f64 - number as f64) / parts as f64
+            }
+        }
     }
 }
 

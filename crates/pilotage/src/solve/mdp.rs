@@ -11,12 +11,12 @@ use nalgebra::DVector;
 
 pub use super::grid::Settings;
 use super::grid::{Axis, Grid, Interpolation, Smoother};
-use super::kbvi::branches::first_best;
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
-use crate::model::{ActionId, HypothesisBelief, ModeId, Model, Then, WallBelief};
+use crate::model::{ActionId, HypothesisBelief, ModeId, Model, Outcome, Then, WallBelief};
 use crate::observe::Observer;
 use crate::parallel;
+use crate::policy::first_best;
 
 /// Most state variables for which a grid of true states is fine enough to be of use.
 pub const MOST_VARIABLES: usize = 3;
@@ -158,7 +158,7 @@ impl StateMdp {
             Space::Points(points) => self.future(mode, action)[nearest(points)],
         };
         (0..self.model().actions.len())
-            .map(|action| reward(self.model(), mode, state, action) + future(action))
+            .map(|action| seen(self.model(), mode, state, action).0 + future(action))
             .collect()
     }
 
@@ -169,30 +169,20 @@ impl StateMdp {
 
     fn entry(&self, mode: ModeId, state: &[f64], action: ActionId) -> Entry {
         let model = self.model();
-        let event = model
-            .events
-            .iter()
-            .find(|event| event.applies(mode, action) && event.region.contains(state));
-        let then = match (model.actions[action].then, event) {
-            (Then::Continue, Some(event)) => event.then,
-            (then, _) => then,
-        };
-        let next = match then {
+        let (reward, outcome) = seen(model, mode, state, action);
+        let next = match outcome.then {
             Then::End => Next::End,
             Then::Restart => Next::Restart,
             Then::Continue => {
                 let centre = &model.motion.a * DVector::from_column_slice(state)
                     + model.displacement(action);
                 Next::Continue {
-                    mode: event.and_then(|event| event.becomes).unwrap_or(mode),
+                    mode: outcome.mode,
                     centre: self.belief_mdp.stop(state, centre).as_slice().to_vec(),
                 }
             }
         };
-        Entry {
-            reward: reward(model, mode, state, action),
-            next,
-        }
+        Entry { reward, next }
     }
 
     /// Averages over the motion noise of each class; none where the states are points.
@@ -267,9 +257,7 @@ impl StateMdp {
     /// Discounted value of a fresh start, where something in the model leads there.
     fn discounted_start(&self) -> f64 {
         let model = self.model();
-        let restarts = model.actions.iter().any(|a| a.then == Then::Restart)
-            || model.events.iter().any(|event| event.then == Then::Restart);
-        if !restarts {
+        if !model.restarts() {
             return 0.0;
         }
         let values = model.start.iter().enumerate().map(|(index, start)| {
@@ -287,17 +275,12 @@ impl StateMdp {
     }
 }
 
-/// `r(s, a)`, with the reward of the event that happens.
-fn reward(model: &Model, mode: ModeId, state: &[f64], action: ActionId) -> f64 {
-    let rewards = model
-        .rewards
-        .iter()
-        .filter(|reward| reward.applies(mode, action) && reward.region.contains(state));
-    let event = model
-        .events
-        .iter()
-        .find(|event| event.applies(mode, action) && event.region.contains(state));
-    rewards.map(|reward| reward.value).sum::<f64>() + event.map_or(0.0, |event| event.reward)
+/// `r(s, a)`, and what happens to mode and episode, for someone who sees the state.
+fn seen(model: &Model, mode: ModeId, state: &[f64], action: ActionId) -> (f64, Outcome) {
+    let mut tally = model.tally(mode, action);
+    let happened = tally.see(&model.effects(mode, action, 0), state);
+    let reward = tally.reward + model.running_cost(state, None, action);
+    (reward, happened.unwrap_or_else(|| tally.rest()))
 }
 
 fn check(settings: &Settings) -> Result<()> {

@@ -10,14 +10,13 @@
 //! # References
 //! M. L. Littman, A. R. Cassandra, L. P. Kaelbling, "Learning policies for partially observable environments: scaling up", 1995.
 
-use super::kbvi::branches::first_best;
 use super::mdp::{Settings, Space, StateMdp};
 use crate::belief::{Belief, BeliefMdp};
 use crate::error::Result;
 use crate::model::ActionId;
 use crate::observe::Observer;
 use crate::parallel;
-use crate::policy::Policy;
+use crate::policy::{Policy, first_best};
 
 /// The policy that is greedy in `Q_MDP`.
 #[derive(Debug)]

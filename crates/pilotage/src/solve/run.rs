@@ -120,8 +120,13 @@ pub fn solve(
                 ..Default::default()
             };
             let policy = closed::solve(&mdp, &grid, observer)?;
-            let converged = policy.converged;
-            planned(kind, &mdp, policy, converged, settings)
+            let (converged, mdp) = (policy.converged, policy.mdp().clone());
+            let (value, remarks) = (policy.planned_value(), policy.remarks().to_vec());
+            Ok(Solution {
+                planned_value: Some(value),
+                remarks,
+                ..planned(kind, &mdp, policy, converged, settings)?
+            })
         }
         SolverKind::Lqg => nearest_action(&mdp, settings),
         SolverKind::Qmdp => {
@@ -178,6 +183,7 @@ fn kbvi(mdp: &BeliefMdp, settings: &SolveSettings, observer: &dyn Observer) -> R
         samples: None,
         learning: None,
         converged: generated.convergence_horizon.is_some(),
+        remarks: Vec::new(),
     })
 }
 
@@ -225,6 +231,7 @@ fn learned(
         samples: Some(samples),
         learning: Some(learning),
         converged,
+        remarks: Vec::new(),
     })
 }
 
@@ -239,6 +246,7 @@ fn control(mdp: &BeliefMdp) -> Result<Solution> {
         samples: None,
         learning: None,
         converged: true,
+        remarks: Vec::new(),
     })
 }
 
@@ -282,6 +290,7 @@ fn searched(mdp: &BeliefMdp, automaton: Automaton) -> Solution {
         samples: None,
         learning: None,
         converged: true,
+        remarks: Vec::new(),
     }
 }
 
@@ -309,6 +318,7 @@ fn planned(
         samples: None,
         learning: None,
         converged,
+        remarks: Vec::new(),
     })
 }
 

@@ -91,6 +91,8 @@ pub struct Solution {
     pub learning: Option<Learning>,
     /// Whether the solver's own test of convergence was passed.
     pub converged: bool,
+    /// What is to be known of it: where it is not what it seems, and why.
+    pub remarks: Vec<String>,
 }
 
 /// A policy and all it takes to run it.

@@ -101,6 +101,7 @@ impl SolverKind {
             Self::Lqg => lqg::use_of(model).err(),
             Self::Qmdp | Self::Mls => reward_missing(model)
                 .or_else(|| pays_afterwards(model))
+                .or_else(|| changes(model))
                 .or_else(|| bound_missing(model))
                 .or_else(|| too_many_variables(model)),
             Self::Kafaq | Self::Arkaq => reward_missing(model),
@@ -120,8 +121,12 @@ impl SolverKind {
 
 /// Those that maximise reward need some, discounted.
 fn reward_missing(model: &Model) -> Option<String> {
-    if model.rewards.is_empty() && model.events.is_empty() && model.episode.failure_reward == 0.0 {
-        return Some("nothing in it pays a reward; add a [[reward]]".to_owned());
+    let pays = !model.rewards.is_empty()
+        || !model.events.is_empty()
+        || model.episode.failure_reward != 0.0
+        || model.cost.is_some();
+    if !pays {
+        return Some("nothing in it pays a reward; add a [[reward]] or a [cost]".to_owned());
     }
     (model.discount >= 1.0).then(|| {
         "its discount is 1, and a sum without end needs one below 1; set `discount` to 0.99 or less"
@@ -135,6 +140,14 @@ fn pays_afterwards(model: &Model) -> Option<String> {
     let mut asked = rewards.chain(model.events.iter().map(|event| event.when));
     asked.any(|when| when == When::After).then(|| {
         "it pays for where a step has led (`when = \"after\"`), and this solver only for where it begins; use kbvi-closed or state the rewards by action and place".to_owned()
+    })
+}
+
+/// Values of true states do not tell the step.
+fn changes(model: &Model) -> Option<String> {
+    let clock = model.clock();
+    (clock > 0).then(|| {
+        format!("what it pays or changes depends on the step of the episode up to step {clock}, and this solver's values do not; use kbvi-closed")
     })
 }
 

@@ -1,6 +1,45 @@
 //! A cart with an inverted pole: the nonlinear equations of motion (Eq. 3.6 and 3.9).
 
-use crate::scenario::CartPole;
+use super::Body;
+use super::linear::LinearSensor;
+use crate::model::{ActionId, ModeId};
+use crate::random::{Rng, normal};
+use crate::scenario::{CartPole, Scenario};
+
+/// The plant, pushed by a force for each action and sensed linearly.
+#[derive(Debug, Clone)]
+pub(super) struct CartAndPole {
+    plant: Plant,
+    /// By action, N.
+    forces: Vec<f64>,
+    /// Standard deviation of the force, N.
+    force_sd: f64,
+    sensor: LinearSensor,
+}
+
+impl CartAndPole {
+    pub fn new(scenario: &Scenario, parameters: &CartPole) -> Self {
+        let actions = scenario.model.actions.iter();
+        Self {
+            plant: Plant::new(parameters.clone()),
+            forces: actions.map(|action| action.control[0]).collect(),
+            force_sd: parameters.force_noise.sqrt(),
+            sensor: LinearSensor::new(scenario),
+        }
+    }
+}
+
+impl Body for CartAndPole {
+    fn advance(&mut self, doing: (ModeId, ActionId), from: &[f64], to: &mut [f64], rng: &mut Rng) {
+        to.copy_from_slice(from);
+        let force = self.forces[doing.1] + self.force_sd * normal(rng);
+        self.plant.advance(to, force);
+    }
+
+    fn sense(&self, action: ActionId, state: &[f64], observation: &mut [f64], rng: &mut Rng) {
+        self.sensor.sense(action, state, observation, rng);
+    }
+}
 
 /// The plant. State: cart position m, velocity m/s, angle of the pole from upright rad, angular velocity rad/s.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,10 @@
 //! What is true: worlds an agent acts in. The agent never looks inside.
+//!
+//! A [`ProblemWorld`] is the world of a scenario. What moves and senses in it is a body, of which there is a file for each simulator;
+//! what that pays and changes is said by the model's effects.
 
 mod cart_pole;
+mod linear;
 mod noise;
 mod problem;
 mod robot;
@@ -22,11 +26,30 @@ pub trait World: Send {
     /// `observation`. Nothing is sensed when the episode ends or restarts.
     fn step(&mut self, action: ActionId, draws: &mut Draws, observation: &mut [f64]) -> Step;
 
+    /// What is paid besides in the current state because an episode ends there, in units of reward.
+    fn ending(&self) -> f64 {
+        0.0
+    }
+
     /// The true state, for drawings and for agents that are told it.
     fn state(&self) -> &[f64];
 
     /// The true hidden mode.
     fn mode(&self) -> ModeId;
+}
+
+/// What moves and senses in a world. States have length `n`, observations `m`.
+trait Body: Send {
+    /// Puts it down at a state, or as near as it can stand, and writes where that is.
+    fn put(&mut self, state: &mut [f64]) {
+        let _ = state;
+    }
+
+    /// Writes to `to` where an action in a mode leads from a state, noise included.
+    fn advance(&mut self, doing: (ModeId, ActionId), from: &[f64], to: &mut [f64], rng: &mut Rng);
+
+    /// Writes what is sensed in a state after an action, noise included.
+    fn sense(&self, action: ActionId, state: &[f64], observation: &mut [f64], rng: &mut Rng);
 }
 
 /// What a step in the world did.

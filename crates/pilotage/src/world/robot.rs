@@ -6,9 +6,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::model::Model;
+use super::Body;
+use crate::model::{ActionId, ModeId, Model};
 use crate::random::{Rng, normal};
-use crate::scenario::Robot;
+use crate::scenario::{Robot, Scenario};
 
 /// How fast a deviation of the heading is turned back, per second.
 const GAIN: f64 = 4.0;
@@ -16,6 +17,41 @@ const GAIN: f64 = 4.0;
 const ALIGNED: f64 = 0.02;
 /// A turn or drive may take this many times as long as without slip; then the controller gives up.
 const PATIENCE: f64 = 4.0;
+
+/// The robot of a scenario, driven by the displacement that each action names.
+#[derive(Debug, Clone)]
+pub(super) struct Driven {
+    arena: RobotArena,
+    /// By action, in units of state, length `n`.
+    displacements: Vec<Vec<f64>>,
+}
+
+impl Driven {
+    pub fn new(scenario: &Scenario, robot: &Robot) -> Self {
+        let model = &scenario.model;
+        let actions = 0..model.actions.len();
+        Self {
+            arena: RobotArena::new(robot, model),
+            displacements: actions
+                .map(|action| model.displacement(action).as_slice().to_vec())
+                .collect(),
+        }
+    }
+}
+
+impl Body for Driven {
+    fn put(&mut self, state: &mut [f64]) {
+        self.arena.put(state);
+    }
+
+    fn advance(&mut self, doing: (ModeId, ActionId), _: &[f64], to: &mut [f64], rng: &mut Rng) {
+        self.arena.carry_out(&self.displacements[doing.1], to, rng);
+    }
+
+    fn sense(&self, _: ActionId, _: &[f64], observation: &mut [f64], rng: &mut Rng) {
+        self.arena.sense(observation, rng);
+    }
+}
 
 /// The robot in its arena.
 #[derive(Debug, Clone)]

@@ -12,8 +12,8 @@ use nalgebra::DVector;
 
 use super::formulas::{Formulas, Outlook};
 use crate::belief::{Belief, BeliefMdp, ClassId};
-use crate::model::{ActionId, ModeId, Then};
-use crate::policy::Policy;
+use crate::model::{ActionId, ModeId, Outcome, Then};
+use crate::policy::{Policy, first_best};
 
 /// Settings of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,10 +78,11 @@ impl Branches {
     /// Where observations gather around the true state and not around the mean (the tiger), the branch is searched once for each
     /// case, as the thesis does, and the cases are weighted by the belief.
     pub fn q_values(&self, belief: &Belief) -> Vec<f64> {
-        let cases = match self.mdp.hypotheses(belief.level, &belief.mean) {
+        let hypotheses = self.mdp.hypotheses(belief.level, &belief.mean);
+        let cases = match &hypotheses {
             Some(points) => points
-                .into_iter()
-                .map(|(weight, point)| (weight, Some(point)))
+                .iter()
+                .map(|(weight, point)| (*weight, Some(point)))
                 .collect(),
             None => vec![(1.0, None)],
         };
@@ -104,17 +105,6 @@ impl Policy for Branches {
     fn value(&self, belief: &Belief) -> Option<f64> {
         self.q_values(belief).into_iter().reduce(f64::max)
     }
-}
-
-/// Index of the largest value; of values equal but for rounding, the first.
-pub(crate) fn first_best(values: &[f64]) -> usize {
-    let mut best = 0;
-    for (index, &value) in values.iter().enumerate() {
-        if value > values[best] + 1e-12 * values[best].abs().max(1.0) {
-            best = index;
-        }
-    }
-    best
 }
 
 /// Index of an outlook in [`Search::outlooks`].
@@ -318,14 +308,11 @@ impl<'a> Search<'a> {
     /// Moves the expected belief on by one step (Eq. 5.3 and 5.5); the mode follows the event that the expected mean calls for.
     fn advance(&mut self, at: &mut Expected, action: ActionId) -> Then {
         let model = self.mdp.model();
-        let event = model.events.iter().find(|event| {
-            event.applies(at.mode, action) && event.region.contains(at.mean.as_slice())
-        });
-        let mode = event.and_then(|event| event.becomes).unwrap_or(at.mode);
-        let then = match model.actions[action].then {
-            Then::Continue => event.map_or(Then::Continue, |event| event.then),
-            ends => ends,
-        };
+        let level = self.outlooks[at.outlook].level;
+        let mut tally = model.tally(at.mode, action);
+        let effects = self.mdp.effects(at.mode, level, action);
+        let happened = tally.see(effects, at.mean.as_slice());
+        let Outcome { mode, then, .. } = happened.unwrap_or_else(|| tally.rest());
         if then != Then::Continue {
             return then;
         }

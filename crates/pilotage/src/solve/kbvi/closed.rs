@@ -9,13 +9,15 @@
 //! ```
 //!
 //! The expectation is taken first, once for each level and noise class: `W(x) = E V(x + K nu)` on the grid of means. Then
-//! `Q` is one look-up of `W` at `A m + B u` for each action. Where the model has failure limits, the belief one step on may have
-//! failed: with probability `f(b')` it earns the reward of failing and nothing more, otherwise `discount * V(b')`.
+//! `Q` is one look-up of `W` at `A m + B u` for each action. Where the model has failure limits, the step may fail: with probability
+//! `f(b, a)` it earns the reward of failing and nothing more.
 //!
 //! Levels are solved in the order in which the filter leaves them, last first, so only those that come back to themselves need
 //! iterating.
 
 use nalgebra::DMatrix;
+use petgraph::algo::tarjan_scc;
+use petgraph::graph::{DiGraph, NodeIndex};
 
 use super::extent::{axes, knows_map, mebibytes};
 use crate::belief::{Belief, BeliefMdp, LevelId};
@@ -33,26 +35,37 @@ pub struct GridPolicy {
     mdp: BeliefMdp,
     grid: Grid,
     /// `V`, by mode and level.
-    values: Vec<Vec<f64>>,
-    /// Probability of having failed, by level; empty without failure limits.
-    failures: Vec<Vec<f64>>,
+    pub(super) values: Vec<Vec<f64>>,
     /// `discount * W`, by mode, level and noise class: what is still to come after an action of the class, by where the next
     /// mean is centred.
-    expected: Vec<Vec<f64>>,
+    pub(super) expected: Vec<Vec<f64>>,
     /// Value of the start belief.
-    start_value: f64,
+    pub(super) start_value: f64,
+    /// What it earns in an episode, where that is not the value of the start belief.
+    pub(super) promised: Option<f64>,
+    pub(super) remarks: Vec<String>,
     /// Whether the tolerance was reached within the allowed sweeps.
     pub converged: bool,
     /// Sweeps over all groups of levels.
     pub sweeps: usize,
 }
 
-/// Plans by value iteration.
+/// Plans by value iteration, for the length of an episode where that matters (see [`super::horizon`]).
 ///
 /// # Errors
-/// [`Error::TooLarge`] where the grid does not fit the memory allowed, [`Error::Setting`] for settings out of range.
+/// [`Error::TooLarge`] where the grid does not fit the memory allowed, [`Error::Setting`] for settings out of range,
+/// [`Error::Unsupported`] where the grid does not see what is paid, [`Error::NotFinite`] where numbers grow beyond all bounds.
 pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> Result<GridPolicy> {
     check(settings)?;
+    super::horizon::plan(mdp, settings, observer)
+}
+
+/// Plans for episodes that are as long as the levels of the decision process say: for ever, unless they tell the time.
+pub(super) fn iterate(
+    mdp: &BeliefMdp,
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<GridPolicy> {
     let grid = Grid::new(axes(mdp, settings)?, Interpolation::Cubic);
     observer.note(&format!(
         "{} levels on a grid of {} points: {} MiB",
@@ -61,10 +74,11 @@ pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> R
         mebibytes(mdp, grid.len() as u64)
     ));
     let mut policy = GridPolicy::new(mdp.clone(), grid);
+    policy.end_episodes();
     let groups = groups_of_levels(mdp);
     observer.progress("levels", 0, groups.len() as u64);
     for (done, group) in groups.iter().enumerate() {
-        policy.solve_group(group, settings);
+        policy.solve_group(group, settings)?;
         observer.progress("levels", done as u64 + 1, groups.len() as u64);
     }
     Ok(policy)
@@ -74,7 +88,7 @@ fn check(settings: &Settings) -> Result<()> {
     if settings.points.is_some_and(|points| points < 2) {
         return Err(Error::Setting {
             setting: "points",
-            value: format!("{:?}", settings.points),
+            value: settings.points.unwrap_or_default().to_string(),
             range: "at least 2",
         });
     }
@@ -95,62 +109,27 @@ fn check(settings: &Settings) -> Result<()> {
     Ok(())
 }
 
-/// Probability of having failed at every point, by level; empty without failure limits.
-fn failures(mdp: &BeliefMdp, grid: &Grid) -> Vec<Vec<f64>> {
-    if mdp.model().episode.alive.sides.is_empty() {
-        return Vec::new();
-    }
-    let at_level =
-        |level| crate::parallel::map(grid.len(), |point| mdp.failure(level, &grid.point(point)));
-    (0..mdp.levels().len()).map(at_level).collect()
-}
-
 /// Levels that lead back to each other, in an order such that every group only leads to itself and those before it.
 fn groups_of_levels(mdp: &BeliefMdp) -> Vec<Vec<LevelId>> {
     let levels = mdp.levels();
-    if (0..mdp.model().actions.len())
-        .any(|action| mdp.model().actions[action].then == Then::Restart)
-        || mdp
-            .model()
-            .events
-            .iter()
-            .any(|event| event.then == Then::Restart)
-    {
+    if mdp.model().restarts() {
         return vec![(0..levels.len()).rev().collect()];
     }
     let classes = levels.classes().len();
-    let reachable: Vec<Vec<bool>> = (0..levels.len())
-        .map(|from| {
-            let mut seen = vec![false; levels.len()];
-            let mut open = vec![from];
-            while let Some(level) = open.pop() {
-                for class in 0..classes {
-                    let next = levels.step(level, class).next;
-                    if !std::mem::replace(&mut seen[next], true) {
-                        open.push(next);
-                    }
-                }
-            }
-            seen
-        })
-        .collect();
-    let mut groups: Vec<Vec<LevelId>> = Vec::new();
-    let mut placed = vec![false; levels.len()];
-    while let Some(level) = (0..levels.len()).rev().find(|&level| {
-        !placed[level]
-            && (0..levels.len()).all(|next| {
-                !reachable[level][next] || placed[next] || reachable[next][level] || next == level
-            })
-    }) {
-        let group: Vec<LevelId> = (0..levels.len())
-            .filter(|&other| other == level || (reachable[level][other] && reachable[other][level]))
-            .collect();
-        for &member in &group {
-            placed[member] = true;
-        }
-        groups.push(group);
-    }
+    let edges = (0..levels.len()).flat_map(|level| {
+        let next = move |class| levels.step(level, class).next as u32;
+        (0..classes).map(move |class| (level as u32, next(class)))
+    });
+    let graph = DiGraph::<(), ()>::from_edges(edges);
+    let group = |nodes: Vec<NodeIndex>| {
+        let mut group: Vec<LevelId> = nodes.into_iter().map(NodeIndex::index).collect();
+        group.sort_unstable();
+        group
+    };
+    let groups = tarjan_scc(&graph).into_iter().map(group);
     groups
+        .filter(|group| !group.iter().any(|level| levels.is_over(*level)))
+        .collect()
 }
 
 impl GridPolicy {
@@ -163,8 +142,9 @@ impl GridPolicy {
         Self {
             values: vec![vec![0.0; grid.len()]; modes * levels],
             expected: vec![vec![0.0; grid.len()]; modes * levels * classes],
-            failures: failures(&mdp, &grid),
             start_value: 0.0,
+            promised: None,
+            remarks: Vec::new(),
             converged: true,
             sweeps: 0,
             mdp,
@@ -182,12 +162,42 @@ impl GridPolicy {
         &self.grid
     }
 
-    /// Planned value of the start belief.
+    /// What the plan expects to earn from the start, over the length of an episode.
+    pub fn planned_value(&self) -> f64 {
+        let start = || self.value(self.mdp.start()).unwrap_or(self.start_value);
+        self.promised.unwrap_or_else(start)
+    }
+
+    /// Value of the start belief.
     pub fn start_value(&self) -> f64 {
         self.start_value
     }
 
-    fn value_index(&self, mode: usize, level: LevelId) -> usize {
+    /// What is to be known of the plan: where it is not what it seems, and why.
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    /// Value of the levels at which an episode is over.
+    fn end_episodes(&mut self) {
+        for level in (0..self.mdp.levels().len()).filter(|level| self.mdp.levels().is_over(*level))
+        {
+            let worth = self.ending(level);
+            for mode in 0..self.mdp.model().modes.len() {
+                let index = self.value_index(mode, level);
+                self.values[index].clone_from(&worth);
+            }
+        }
+    }
+
+    /// What ending an episode is worth at every point of a level.
+    pub(super) fn ending(&self, level: LevelId) -> Vec<f64> {
+        crate::parallel::map(self.grid.len(), |point| {
+            self.mdp.terminal_cost(level, &self.grid.point(point))
+        })
+    }
+
+    pub(super) fn value_index(&self, mode: usize, level: LevelId) -> usize {
         mode * self.mdp.levels().len() + level
     }
 
@@ -196,17 +206,10 @@ impl GridPolicy {
     }
 
     /// Value iteration on a group of levels until the change bounds the error by the tolerance.
-    fn solve_group(&mut self, group: &[LevelId], settings: &Settings) {
+    fn solve_group(&mut self, group: &[LevelId], settings: &Settings) -> Result<()> {
         let discount = self.mdp.model().discount;
         let backups = self.backups(group);
-        let smoothers: Vec<Vec<Average>> = group
-            .iter()
-            .map(|&level| {
-                (0..self.mdp.levels().classes().len())
-                    .map(|class| self.average(&self.mdp.spread(level, class)))
-                    .collect()
-            })
-            .collect();
+        let smoothers = self.smoothers(group);
         let target = settings.tolerance * (1.0 - discount) / discount.max(1e-9);
         for _ in 0..settings.sweeps {
             self.sweeps += 1;
@@ -217,43 +220,60 @@ impl GridPolicy {
             for backup in &backups {
                 let index = self.value_index(backup.mode, backup.level);
                 let fresh = self.back_up(backup);
-                change = fresh
-                    .iter()
-                    .zip(&self.values[index])
-                    .fold(change, |change, (new, old)| change.max((new - old).abs()));
+                change = self.change(backup, &fresh, change)?;
                 self.values[index] = fresh;
             }
-            let start = self.mdp.start();
-            self.start_value = self.grid.interpolate(
-                &self.values[self.value_index(start.mode, start.level)],
-                &start.mean,
-            );
+            self.start_value = self.value_at_start();
             let leads_outside_only = group.len() == 1 && self.leaves_itself(group[0]);
             if change <= target || leads_outside_only {
                 for (&level, smoothers) in group.iter().zip(&smoothers) {
                     self.smooth(level, smoothers);
                 }
-                return;
+                return Ok(());
             }
         }
         self.converged = false;
+        Ok(())
+    }
+
+    /// By level of a group and noise class: how the next mean spreads.
+    pub(super) fn smoothers(&self, group: &[LevelId]) -> Vec<Vec<Average>> {
+        let classes = 0..self.mdp.levels().classes().len();
+        let of = |&level: &LevelId| {
+            let class = |class| self.average(&self.mdp.spread(level, class));
+            classes.clone().map(class).collect()
+        };
+        group.iter().map(of).collect()
+    }
+
+    /// The larger of a change and that of the values of a backup, all of them finite.
+    fn change(&self, backup: &Backup, fresh: &[f64], change: f64) -> Result<f64> {
+        let old = &self.values[self.value_index(backup.mode, backup.level)];
+        if let Some(point) = fresh.iter().position(|value| !value.is_finite()) {
+            return Err(Error::NotFinite {
+                what: "the value of a belief".to_owned(),
+                value: fresh[point],
+                place: format!(
+                    "mean {:?} at uncertainty level {}",
+                    self.grid.point(point),
+                    backup.level
+                ),
+                remedy: "its rewards, or what multiplies the state, are too large to add up; state them in other units",
+            });
+        }
+        let changes = fresh.iter().zip(old).map(|(new, old)| (new - old).abs());
+        Ok(changes.fold(change, f64::max))
+    }
+
+    pub(super) fn value_at_start(&self) -> f64 {
+        let start = self.mdp.start();
+        let values = &self.values[self.value_index(start.mode, start.level)];
+        self.grid.interpolate(values, &start.mean)
     }
 
     /// Whether no action comes back to the level, nor to the start.
     fn leaves_itself(&self, level: LevelId) -> bool {
-        let restarts = self
-            .mdp
-            .model()
-            .actions
-            .iter()
-            .any(|action| action.then == Then::Restart)
-            || self
-                .mdp
-                .model()
-                .events
-                .iter()
-                .any(|event| event.then == Then::Restart);
-        !restarts
+        !self.mdp.model().restarts()
             && (0..self.mdp.levels().classes().len())
                 .all(|class| self.mdp.levels().step(level, class).next != level)
     }
@@ -266,7 +286,7 @@ impl GridPolicy {
         }
     }
 
-    fn smooth(&mut self, level: LevelId, smoothers: &[Average]) {
+    pub(super) fn smooth(&mut self, level: LevelId, smoothers: &[Average]) {
         for mode in 0..self.mdp.model().modes.len() {
             for (class, smoother) in smoothers.iter().enumerate() {
                 let next = self.mdp.levels().step(level, class).next;
@@ -276,23 +296,15 @@ impl GridPolicy {
         }
     }
 
-    /// What a belief at a level is worth to a step that leads there: discounted, unless it failed on the way.
+    /// What a belief at a level is worth to a step that leads there: discounted.
     fn to_come(&self, mode: usize, level: LevelId) -> Vec<f64> {
-        let model = self.mdp.model();
+        let discount = self.mdp.model().discount;
         let values = self.values[self.value_index(mode, level)].iter();
-        match self.failures.get(level) {
-            None => values.map(|value| model.discount * value).collect(),
-            Some(failures) => values
-                .zip(failures)
-                .map(|(value, failed)| {
-                    failed * model.episode.failure_reward + (1.0 - failed) * model.discount * value
-                })
-                .collect(),
-        }
+        values.map(|value| discount * value).collect()
     }
 
     /// Rewards and places to look up, which no sweep changes.
-    fn backups(&self, group: &[LevelId]) -> Vec<Backup> {
+    pub(super) fn backups(&self, group: &[LevelId]) -> Vec<Backup> {
         let actions = self.mdp.model().actions.len();
         let mut backups = Vec::new();
         for &level in group {
@@ -316,22 +328,28 @@ impl GridPolicy {
     }
 
     fn backup_entry(&self, mode: usize, level: LevelId, mean: &[f64], action: ActionId) -> Entry {
-        let outcomes = self.mdp.outcomes(mode, level, mean, action);
-        let restart = outcomes
-            .iter()
-            .filter(|outcome| outcome.then == Then::Restart)
-            .map(|outcome| outcome.probability)
-            .sum();
-        let mut next: Vec<(usize, f64)> = Vec::new();
-        for outcome in outcomes
-            .iter()
-            .filter(|outcome| outcome.then == Then::Continue)
-        {
-            next.push((
-                self.expected_index(outcome.mode, level, self.mdp.levels().class_of(action)),
-                outcome.probability,
-            ));
+        let (mut reward, outcomes) = self.mdp.step(mode, level, mean, action);
+        let model = self.mdp.model();
+        let share = |then: Then| -> f64 {
+            let such = outcomes.iter().filter(|outcome| outcome.then == then);
+            such.map(|outcome| outcome.probability).sum()
+        };
+        if model.cost.is_some() {
+            reward += share(Then::End) * model.discount * self.mdp.terminal_cost(level, mean);
         }
+        let fails = self.mdp.failure(level, mean, action);
+        if fails > 0.0 {
+            reward += share(Then::Continue) * fails * model.episode.failure_reward;
+        }
+        let class = self.mdp.levels().class_of(action);
+        let next: Vec<(usize, f64)> = outcomes
+            .iter()
+            .filter(|outcome| outcome.then == Then::Continue && fails < 1.0)
+            .map(|outcome| {
+                let index = self.expected_index(outcome.mode, level, class);
+                (index, (1.0 - fails) * outcome.probability)
+            })
+            .collect();
         let centres = if next.is_empty() {
             Vec::new()
         } else {
@@ -342,14 +360,14 @@ impl GridPolicy {
                 .collect()
         };
         Entry {
-            reward: self.mdp.reward(mode, level, mean, action),
-            restart,
+            reward,
+            restart: share(Then::Restart),
             next,
             centres,
         }
     }
 
-    fn q(&self, entry: &Entry) -> f64 {
+    pub(super) fn q(&self, entry: &Entry) -> f64 {
         let mut future = self.mdp.model().discount * entry.restart * self.start_value;
         for (expected, probability) in &entry.next {
             for (weight, centre) in &entry.centres {
@@ -360,7 +378,7 @@ impl GridPolicy {
         entry.reward + future
     }
 
-    fn back_up(&self, backup: &Backup) -> Vec<f64> {
+    pub(super) fn back_up(&self, backup: &Backup) -> Vec<f64> {
         crate::parallel::map(backup.entries.len(), |point| {
             backup.entries[point]
                 .iter()
@@ -376,7 +394,7 @@ impl GridPolicy {
 }
 
 /// How the next mean spreads around its centre.
-enum Average {
+pub(super) enum Average {
     /// Freely, but for the ends of the grid.
     Free(Smoother),
     /// Stopped by the walls of a map.
@@ -394,7 +412,7 @@ impl Average {
 
 /// One action at one point: reward, probability of a restart, tables to look up with their probability, and where.
 #[derive(Debug)]
-struct Entry {
+pub(super) struct Entry {
     reward: f64,
     restart: f64,
     next: Vec<(usize, f64)>,
@@ -402,11 +420,11 @@ struct Entry {
 }
 
 #[derive(Debug)]
-struct Backup {
-    mode: usize,
-    level: LevelId,
+pub(super) struct Backup {
+    pub mode: usize,
+    pub level: LevelId,
     /// By grid point, then action.
-    entries: Vec<Vec<Entry>>,
+    pub entries: Vec<Vec<Entry>>,
 }
 
 impl Policy for GridPolicy {

@@ -3,11 +3,16 @@
 use super::closed::Settings;
 use crate::belief::{BeliefMdp, LevelId};
 use crate::error::{Error, Result};
-use crate::model::{Model, WallBelief};
+use crate::model::{Map, Model, Region, WallBelief};
 use crate::solve::grid::Axis;
 use crate::solve::walled::WalledSmoother;
 
-/// The grid covers the bounds and as far beyond as the mean can stray. Where the belief knows of walls it ends at them.
+/// The grid covers the bounds and as far beyond as the mean can stray. Where the belief knows of walls it ends at them. Along a variable
+/// without any noise it has points at all the means that the controls lead to.
+///
+/// # Errors
+/// [`Error::Unsupported`] for too many variables, for rewards or events that lie where the grid does not reach or that are too narrow for
+/// the points asked for; [`Error::TooLarge`] where it does not fit the memory allowed.
 pub(super) fn axes(mdp: &BeliefMdp, settings: &Settings) -> Result<Vec<Axis>> {
     let model = mdp.model();
     let n = model.state_dim();
@@ -18,16 +23,23 @@ pub(super) fn axes(mdp: &BeliefMdp, settings: &Settings) -> Result<Vec<Axis>> {
         (None, 2) => 241,
         (None, 3) => 61,
         (None, _) => {
-            return Err(Error::Unsupported {
-                solver: "kbvi-closed",
-                model: model.name.clone(),
-                reason: format!(
+            return Err(unsupported(
+                model,
+                format!(
                     "a grid in {n} variables is too coarse to be right; state the problem in at most 3, add failure limits (`alive` in [episode]), which are planned for without a grid, or set the points of the grid (--grid)"
                 ),
-            });
+            ));
         }
     };
-    let total = (points as u64).saturating_pow(n as u32);
+    let axes: Vec<Axis> = (0..n).map(|variable| axis(mdp, variable, points)).collect();
+    within_reach(model, &axes)?;
+    let axes: Vec<Axis> = axes
+        .iter()
+        .enumerate()
+        .map(|(variable, axis)| fine_enough(mdp, settings, variable, axis))
+        .collect::<Result<_>>()?;
+    let count = |total: u64, axis: &Axis| total.saturating_mul(axis.count as u64);
+    let total = axes.iter().fold(1, count);
     let mebibytes = mebibytes(mdp, total);
     if mebibytes > settings.memory {
         return Err(Error::TooLarge {
@@ -37,21 +49,131 @@ pub(super) fn axes(mdp: &BeliefMdp, settings: &Settings) -> Result<Vec<Axis>> {
             limit: settings.memory,
         });
     }
-    let axes = (0..n).map(|variable| {
-        let bounds = model.state[variable].bounds;
-        if model.belief.walls == WallBelief::Clip {
-            return Axis::new(bounds.low, bounds.high, points);
+    Ok(axes)
+}
+
+fn unsupported(model: &Model, reason: String) -> Error {
+    Error::Unsupported {
+        solver: "kbvi-closed",
+        model: model.name.clone(),
+        reason,
+    }
+}
+
+fn axis(mdp: &BeliefMdp, variable: usize, points: usize) -> Axis {
+    let model = mdp.model();
+    let bounds = model.state[variable].bounds;
+    if model.belief.walls == WallBelief::Clip {
+        return Axis::new(bounds.low, bounds.high, points);
+    }
+    let largest = |level: LevelId, class: usize| mdp.spread(level, class)[(variable, variable)];
+    let levels = 0..mdp.levels().len();
+    let classes = mdp.levels().classes().len();
+    let variance = levels
+        .flat_map(|level| (0..classes).map(move |class| (level, class)))
+        .map(|(l, c)| largest(l, c))
+        .fold(0.0, f64::max);
+    let axis = Axis::around(bounds, variance.sqrt(), points);
+    match stride(model, variable) {
+        Some(length) if variance == 0.0 => axis.through(mdp.start().mean[variable], length),
+        _ => axis,
+    }
+}
+
+/// The length of which all ways that actions take along a variable are multiples, where it moves by them alone.
+fn stride(model: &Model, variable: usize) -> Option<f64> {
+    const FINEST: f64 = 1e-6;
+    let row = model.motion.a.row(variable);
+    let stays = row
+        .iter()
+        .enumerate()
+        .all(|(i, a)| *a == f64::from(i == variable));
+    let ways = (0..model.actions.len()).map(|action| model.displacement(action)[variable].abs());
+    let ways: Vec<f64> = ways.filter(|way| *way > 0.0).collect();
+    let largest = ways.iter().copied().fold(0.0, f64::max);
+    let common = ways.iter().fold(0.0, |mut a: f64, &b| {
+        let mut b = b;
+        while b > FINEST * largest {
+            let rest = a % b;
+            // What is left but for rounding is nothing, or all of it.
+            let rest = if b - rest < FINEST * largest {
+                0.0
+            } else {
+                rest
+            };
+            (a, b) = (b, rest);
         }
-        let largest = |level: LevelId, class: usize| mdp.spread(level, class)[(variable, variable)];
-        let levels = 0..mdp.levels().len();
-        let classes = mdp.levels().classes().len();
-        let variance = levels
-            .flat_map(|level| (0..classes).map(move |class| (level, class)))
-            .map(|(l, c)| largest(l, c))
-            .fold(0.0, f64::max);
-        Axis::around(bounds, variance.sqrt(), points)
+        a
     });
-    Ok(axes.collect())
+    (stays && common > FINEST * largest).then_some(common)
+}
+
+/// What lies in places that the belief or the world rules out is not paid by anybody; what lies where the grid does not reach would be
+/// paid, and not planned for.
+fn within_reach(model: &Model, axes: &[Axis]) -> Result<()> {
+    let solid = model.map.as_ref().map(Map::solid).unwrap_or_default();
+    for (what, region) in paid_places(model) {
+        if solid.contains(region) {
+            continue;
+        }
+        for &(variable, side) in &region.sides {
+            let (low, high) = (
+                axes[variable].low,
+                axes[variable].at(axes[variable].count - 1),
+            );
+            if side.high <= low || side.low >= high {
+                return Err(unsupported(
+                    model,
+                    format!(
+                        "{what} lies in {} = [{}, {}], and its bounds let planners look from {low} to {high} only; widen `state.bounds`, or delete it",
+                        model.state[variable].name, side.low, side.high
+                    ),
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Places where something is paid or changed, with their names.
+fn paid_places(model: &Model) -> impl Iterator<Item = (String, &Region)> {
+    let rewards = model.rewards.iter().enumerate();
+    let rewards = rewards.map(|(i, term)| (format!("reward {}", i + 1), &term.region));
+    let events = model.events.iter().enumerate();
+    rewards.chain(events.map(|(i, event)| (format!("event {}", i + 1), &event.region)))
+}
+
+/// Points so close that no reward falls between two of them: the expected reward of a belief changes over a length of the place it is paid
+/// in, or of the belief's own width where that is more.
+fn fine_enough(mdp: &BeliefMdp, settings: &Settings, variable: usize, axis: &Axis) -> Result<Axis> {
+    let model = mdp.model();
+    let variance = |level| mdp.levels().covariance(level)[(variable, variable)];
+    let least = (0..mdp.levels().len())
+        .map(variance)
+        .fold(f64::INFINITY, f64::min);
+    let narrowest = paid_places(model)
+        .map(|(what, region)| (region.side(variable).width(), what))
+        .filter(|(width, _)| width.is_finite())
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((width, what)) = narrowest else {
+        return Ok(*axis);
+    };
+    let length = width.max(least.max(0.0).sqrt());
+    if axis.step <= 0.5 * length {
+        return Ok(*axis);
+    }
+    let factor = (axis.step / (0.5 * length)).ceil();
+    let needed = (axis.count as f64 - 1.0) * factor + 1.0;
+    if settings.points.is_some() || needed > 1e7 {
+        return Err(unsupported(
+            model,
+            format!(
+                "{what} is {width} wide along {}, and the points of the grid are {} apart; give at least {needed} points (--grid), or narrower bounds",
+                model.state[variable].name, axis.step
+            ),
+        ));
+    }
+    Ok(axis.finer(factor as usize))
 }
 
 /// Functions kept on the grid: values, expectations and probabilities of failing.

@@ -125,7 +125,7 @@ impl Formulas {
         match self.reward {
             RewardFormula::Exact if mdp.is_gaussian() => {
                 // The average of N(s; m, P) over N(m; mean, V) is N(s; mean, V + P).
-                terms(mdp, mode, action, |region| {
+                terms(mdp, mode, outlook.level, action, |region| {
                     region_probability(mean.as_slice(), &outlook.total, region)
                 })
             }
@@ -135,7 +135,7 @@ impl Formulas {
             RewardFormula::Exact => over_gaussian(mean, &outlook.covariance, |mean| {
                 mdp.reward(mode, outlook.level, mean, action)
             }),
-            RewardFormula::Ramp => terms(mdp, mode, action, |region| {
+            RewardFormula::Ramp => terms(mdp, mode, outlook.level, action, |region| {
                 self.ramp(mdp, outlook, mean, region)
             }),
         }
@@ -164,23 +164,13 @@ impl Formulas {
 fn terms(
     mdp: &BeliefMdp,
     mode: ModeId,
+    level: LevelId,
     action: ActionId,
     probability: impl Fn(&Region) -> f64,
 ) -> f64 {
-    let model = mdp.model();
-    let rewards = model
-        .rewards
+    mdp.effects(mode, level, action)
         .iter()
-        .filter(|reward| reward.applies(mode, action))
-        .map(|reward| (reward.value, &reward.region));
-    let events = model
-        .events
-        .iter()
-        .filter(|event| event.applies(mode, action))
-        .map(|event| (event.reward, &event.region));
-    rewards
-        .chain(events)
-        .map(|(value, region)| value * probability(region))
+        .map(|effect| effect.reward * probability(&effect.region))
         .sum()
 }
 

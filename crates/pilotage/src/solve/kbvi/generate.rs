@@ -3,13 +3,13 @@
 //! For every horizon the agent is run anew, and the automaton built anew by the rule of its form. The horizon from which on the
 //! number of nodes no longer changes is the *policy convergence horizon*.
 
-use super::branches::{Branches, first_best};
+use super::branches::Branches;
 use crate::belief::{Belief, BeliefMdp};
 use crate::error::{Error, Result};
 use crate::model::ActionId;
 use crate::observe::Observer;
 use crate::parallel;
-use crate::policy::{Automaton, Matching, Policy};
+use crate::policy::{Automaton, Matching, Policy, first_best};
 use crate::scenario::Scenario;
 use crate::simulate::{FilterAgent, run_episode};
 use crate::solve::SolverKind;
@@ -117,7 +117,6 @@ pub fn generate(
     })
 }
 
-/// The branches' formulas are for rewards `r(s, a)`.
 /// Whether the number of nodes has stayed the same over the last `repeats` horizons.
 fn settled(history: &[(usize, usize)], repeats: usize) -> bool {
     history.len() > repeats

@@ -5,4 +5,5 @@ pub mod closed;
 mod extent;
 pub mod formulas;
 pub mod generate;
+mod horizon;
 pub mod quadratic;

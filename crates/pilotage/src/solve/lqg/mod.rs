@@ -11,11 +11,9 @@
 
 mod control;
 mod nearest;
-mod tune;
 
 pub use control::Controller;
 pub use nearest::{NearestAction, Weights};
-pub use tune::{PoleWeights, tuned};
 
 use nalgebra::DMatrix;
 

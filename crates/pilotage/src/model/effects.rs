@@ -1,0 +1,211 @@
+//! What a step does besides moving the state: rewards, events, and the end of an episode. Said once, for the world that tests it at a
+//! state and for beliefs that integrate it.
+//!
+//! A step asks twice where the state is ([`When`]): when the action is taken, and where it has led. Of all [`Effect`]s that apply,
+//! plain rewards add up, and of those that change something (events) the first happens and no other. What the action itself does to the
+//! episode comes before what an event does; a step that ends or restarts the episode does not move.
+
+use nalgebra::DMatrix;
+
+use super::{ActionId, Event, ModeId, Model, Region, Then, When};
+
+/// One thing that a step can do. Whoever knows how likely its region holds knows the rest ([`Tally`]).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    /// Where the state must be.
+    pub region: Region,
+    /// When it must be there.
+    pub when: When,
+    /// Paid when it happens.
+    pub reward: f64,
+    /// What it changes; `None` for a reward, which is paid beside everything else.
+    pub change: Option<Change>,
+}
+
+/// What an event changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Change {
+    /// Mode afterwards.
+    pub mode: ModeId,
+    /// What it does to the episode.
+    pub then: Then,
+}
+
+/// One thing that can have happened to mode and episode once the step is over.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// Its probability; those of one action sum to 1.
+    pub probability: f64,
+    /// Mode afterwards.
+    pub mode: ModeId,
+    /// What happens to the episode.
+    pub then: Then,
+}
+
+impl Model {
+    /// All that an action can do in a mode: rewards, then events in the order in which they are asked, those before the move first.
+    /// `step` counts the steps of the episode from 0.
+    pub fn effects(&self, mode: ModeId, action: ActionId, step: usize) -> Vec<Effect> {
+        let rewards = self.rewards.iter();
+        let rewards =
+            rewards.filter(|term| term.steps.contains(step) && term.applies(mode, action));
+        let paid = rewards.map(|term| Effect {
+            region: term.region.clone(),
+            when: term.when,
+            reward: term.value,
+            change: None,
+        });
+        let mut events: Vec<&Event> = self
+            .events
+            .iter()
+            .filter(|event| event.steps.contains(step) && event.applies(mode, action))
+            .collect();
+        events.sort_by_key(|event| event.when == When::After);
+        let happening = events.into_iter().map(|event| Effect {
+            region: event.region.clone(),
+            when: event.when,
+            reward: event.reward,
+            change: Some(Change {
+                mode: event.becomes.unwrap_or(mode),
+                then: event.then,
+            }),
+        });
+        paid.chain(happening).collect()
+    }
+
+    /// What the [`QuadraticCost`](super::QuadraticCost) pays, 0 or less, for an action in a state whose mean is `mean` (length `n`) and
+    /// whose covariance, if it is not known, is `covariance` (`n x n`): `-(m' Q m + tr(Q P) + u' R u)`.
+    pub fn running_cost(
+        &self,
+        mean: &[f64],
+        covariance: Option<&DMatrix<f64>>,
+        action: ActionId,
+    ) -> f64 {
+        self.cost.as_ref().map_or(0.0, |cost| {
+            let control = self.actions[action].control.as_slice();
+            -(quadratic(&cost.state, mean, covariance) + quadratic(&cost.control, control, None))
+        })
+    }
+
+    /// The same for a state in which an episode ends.
+    pub fn terminal_cost(&self, mean: &[f64], covariance: Option<&DMatrix<f64>>) -> f64 {
+        let terminal = self.cost.as_ref();
+        terminal.map_or(0.0, |cost| -quadratic(&cost.terminal, mean, covariance))
+    }
+
+    /// The account of a step that has not happened yet.
+    pub fn tally(&self, mode: ModeId, action: ActionId) -> Tally {
+        Tally {
+            reward: 0.0,
+            mode,
+            ends: self.actions[action].then,
+            left: 1.0,
+        }
+    }
+
+    /// The first step of an episode from which on nothing in the model changes any more with the step; 0 where nothing ever does.
+    pub fn clock(&self) -> usize {
+        let rewards = self.rewards.iter().map(|term| term.steps);
+        let steps = rewards.chain(self.events.iter().map(|event| event.steps));
+        steps.map(|steps| steps.settled()).max().unwrap_or(0)
+    }
+
+    /// Whether anything leads back to the start.
+    pub fn restarts(&self) -> bool {
+        let ends = self.actions.iter().map(|action| action.then);
+        let mut ends = ends.chain(self.events.iter().map(|event| event.then));
+        ends.any(|then| then == Then::Restart)
+    }
+}
+
+/// `E x' W x` of a vector with that mean and covariance.
+fn quadratic(weights: &DMatrix<f64>, mean: &[f64], covariance: Option<&DMatrix<f64>>) -> f64 {
+    let n = mean.len();
+    let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let of = |(i, j)| {
+        let spread = covariance.map_or(0.0, |covariance| covariance[(i, j)]);
+        weights[(i, j)] * (mean[i] * mean[j] + spread)
+    };
+    pairs.map(of).sum()
+}
+
+/// Splits the regions of events so that no two of the same time overlap: each is left with what comes to it first. Then the
+/// probability of an event is that of its regions.
+pub fn apart(effects: Vec<Effect>) -> Vec<Effect> {
+    let mut taken: Vec<(When, Region)> = Vec::new();
+    let mut split = Vec::with_capacity(effects.len());
+    for effect in effects {
+        if effect.change.is_none() {
+            split.push(effect);
+            continue;
+        }
+        let earlier = taken.iter().filter(|(when, _)| *when == effect.when);
+        let rest = earlier.fold(vec![effect.region.clone()], |rest, (_, region)| {
+            rest.iter()
+                .flat_map(|piece| piece.without(region))
+                .collect()
+        });
+        taken.push((effect.when, effect.region.clone()));
+        split.extend(rest.into_iter().map(|region| Effect {
+            region,
+            ..effect.clone()
+        }));
+    }
+    split
+}
+
+/// The account of a step: fed with its effects in order and how likely the region of each holds (0 or 1 for someone who sees the
+/// state), it knows the expected reward, and says what can have happened.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tally {
+    /// Expected reward so far.
+    pub reward: f64,
+    mode: ModeId,
+    ends: Then,
+    /// Probability that no event has happened yet.
+    left: f64,
+}
+
+impl Tally {
+    /// Takes in the next effect, whose region holds with this probability; for an event, the outcome that it leads to.
+    pub fn take(&mut self, effect: &Effect, holds: f64) -> Option<Outcome> {
+        let Some(change) = effect.change else {
+            self.reward += effect.reward * holds;
+            return None;
+        };
+        let probability = holds.min(self.left);
+        self.left -= probability;
+        self.reward += effect.reward * probability;
+        Some(Outcome {
+            probability,
+            mode: change.mode,
+            then: match self.ends {
+                Then::Continue => change.then,
+                ends => ends,
+            },
+        })
+    }
+
+    /// Takes in effects for someone who sees the state, of length `n`; what has happened, if an event has.
+    pub fn see<'a>(
+        &mut self,
+        effects: impl IntoIterator<Item = &'a Effect>,
+        state: &[f64],
+    ) -> Option<Outcome> {
+        let mut happened = None;
+        for effect in effects {
+            let outcome = self.take(effect, f64::from(effect.region.contains(state)));
+            happened = happened.or(outcome.filter(|outcome| outcome.probability == 1.0));
+        }
+        happened
+    }
+
+    /// What has happened where no event has.
+    pub fn rest(&self) -> Outcome {
+        Outcome {
+            probability: self.left,
+            mode: self.mode,
+            then: self.ends,
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! What a plan promises, and what it earns: where its model holds, and in the world.
+
+use super::Solution;
+use crate::belief::BeliefMdp;
+use crate::error::Result;
+use crate::model::{HypothesisBelief, Model, WallBelief};
+use crate::observe::Observer;
+use crate::scenario::{Scenario, Walls};
+use crate::simulate::{Estimate, Evaluation, Options};
+
+/// What a solution earns, beside its promise ([`Solution::planned_value`]). All are returns over an episode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Earned {
+    /// In the world that the model assumes ([`Scenario::assumed`]).
+    pub assumed: Evaluation,
+    /// In the scenario's world; the same where that is the one assumed.
+    pub world: Evaluation,
+    /// What is to be known of the difference, and of the plan.
+    pub remarks: Vec<String>,
+}
+
+/// A promise that misses what is earned by more than three standard errors and this share of it is remarked upon.
+const SHARE: f64 = 0.01;
+
+impl Solution {
+    /// Runs the solution where its model holds, and in the scenario's world.
+    ///
+    /// # Errors
+    /// As [`Solution::evaluate`].
+    pub fn earned(
+        &self,
+        scenario: &Scenario,
+        options: Options,
+        observer: &dyn Observer,
+    ) -> Result<Earned> {
+        let world = self.evaluate(scenario, options, observer)?;
+        let assumed = match scenario.is_as_assumed() {
+            true => world,
+            false => self.evaluate(&Scenario::assumed(&scenario.model), options, observer)?,
+        };
+        let mut remarks = self.remarks.clone();
+        let missed = self
+            .planned_value
+            .and_then(|planned| missed(planned, &assumed.discounted));
+        if let Some(missed) = missed {
+            let reasons = reasons(&scenario.model);
+            remarks.push(match reasons.is_empty() {
+                true => missed,
+                false => format!("{missed}: {}", reasons.join("; ")),
+            });
+        }
+        if scenario.truth.walls == Walls::Clamp && scenario.model.belief.walls == WallBelief::Ignore
+        {
+            remarks.push("the world has walls, and the belief does not know of them: the plan expects another return than is earned; write `walls = \"clip\"` in [belief]".to_owned());
+        }
+        Ok(Earned {
+            assumed,
+            world,
+            remarks,
+        })
+    }
+}
+
+/// Says by how much a promise misses what is earned where it should hold, if it does.
+fn missed(planned: f64, earned: &Estimate) -> Option<String> {
+    let apart = (planned - earned.mean).abs();
+    let allowed = 3.0 * earned.stderr + SHARE * planned.abs().max(earned.mean.abs());
+    // Not a number is neither more nor less.
+    let holds = apart <= allowed;
+    (!holds).then(|| {
+        format!(
+            "planned {planned:.4}, and where the model holds {:.4} ± {:.4} is earned",
+            earned.mean, earned.stderr
+        )
+    })
+}
+
+/// What in a model makes a belief say something else than is so.
+fn reasons(model: &Model) -> Vec<String> {
+    let mut reasons = Vec::new();
+    if model.modes.len() > 1 {
+        reasons.push("one hidden mode is believed at a time, and planned for as if it were known");
+    }
+    if model.belief.walls == WallBelief::Clip {
+        reasons.push("the belief at a wall is a clipped Gaussian, and the state there is not");
+    }
+    if model.belief.hypotheses == HypothesisBelief::Track && model.start.len() > 1 {
+        reasons.push("the plan is for one who is told which of its starts is true");
+    }
+    if model.belief.hypotheses == HypothesisBelief::Gaussian && model.start.len() > 1 {
+        reasons.push("several starts are taken for one Gaussian");
+    }
+    if !model.episode.alive.sides.is_empty() {
+        reasons.push("the belief does not learn from not having failed");
+    }
+    let mut reasons: Vec<String> = reasons.into_iter().map(str::to_owned).collect();
+    let levels = BeliefMdp::new(model);
+    if !levels.levels().converged() {
+        reasons.push(format!(
+            "uncertainty levels were cut at {} (`belief.level_limit`), while uncertainty still changed",
+            model.belief.level_limit
+        ));
+    }
+    reasons
+}
