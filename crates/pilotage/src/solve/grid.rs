@@ -81,6 +81,16 @@ impl Axis {
         }
     }
 
+    /// `count` points from `low` on, so far apart.
+    pub fn stepping(low: f64, step: f64, count: usize) -> Self {
+        Self {
+            low,
+            step,
+            count,
+            lattice: None,
+        }
+    }
+
     /// `count` points that cover the bounds and as far beyond as what moves by `sd` a step can stray: one width and four standard
     /// deviations.
     pub fn around(bounds: Interval, sd: f64, count: usize) -> Self {

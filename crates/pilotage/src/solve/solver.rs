@@ -97,7 +97,7 @@ impl SolverKind {
             Self::KbviClosed if quadratic::suits(model) => {
                 quadratic::refusal(&BeliefMdp::new(model))
             }
-            Self::KbviClosed => reward_missing(model).or_else(|| bound_missing(model)),
+            Self::KbviClosed => nothing_paid(model).or_else(|| bound_missing(model)),
             Self::Lqg => lqg::use_of(model).err(),
             Self::Qmdp | Self::Mls => reward_missing(model)
                 .or_else(|| pays_afterwards(model))
@@ -120,13 +120,21 @@ impl SolverKind {
 }
 
 /// Those that maximise reward need some, discounted.
-fn reward_missing(model: &Model) -> Option<String> {
+fn nothing_paid(model: &Model) -> Option<String> {
     let pays = !model.rewards.is_empty()
         || !model.events.is_empty()
         || model.episode.failure_reward != 0.0
         || model.cost.is_some();
     if !pays {
         return Some("nothing in it pays a reward; add a [[reward]] or a [cost]".to_owned());
+    }
+    None
+}
+
+/// Sums without end need a discount.
+fn reward_missing(model: &Model) -> Option<String> {
+    if let Some(reason) = nothing_paid(model) {
+        return Some(reason);
     }
     (model.discount >= 1.0).then(|| {
         "its discount is 1, and a sum without end needs one below 1; set `discount` to 0.99 or less"
