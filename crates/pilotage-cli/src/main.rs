@@ -23,7 +23,6 @@ use failure::Failure;
 #[derive(Parser)]
 #[command(
     version,
-    about,
     max_term_width = 100,
     arg_required_else_help = true,
     after_help = "`pilotage solve --help` lists the settings of planners and learners."

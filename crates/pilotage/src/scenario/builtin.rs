@@ -9,6 +9,10 @@ use crate::model::{ModelError, nearest, suggest};
 /// How the name of a model file ends.
 const SUFFIX: &str = ".toml";
 
+/// Most bytes of a name that is compared with others, and most files that it is compared with.
+const LONGEST: usize = 255;
+const MOST_FILES: usize = 1_000;
+
 macro_rules! models {
     ($($name:literal),* $(,)?) => {
         &[$(($name, include_str!(concat!("../../models/", $name, ".toml")))),*]
@@ -90,9 +94,13 @@ pub fn find(name_or_path: impl AsRef<Path>) -> Result<Scenario, ModelError> {
 fn meant(path: &Path) -> Option<String> {
     let here = path.parent()?;
     let stem = path.file_stem()?.to_str()?;
+    if stem.len() > LONGEST {
+        return None;
+    }
     let in_folder = model_files(here).into_iter().filter_map(|file| {
-        let shown = here.join(&file).display().to_string();
-        Some((file.strip_suffix(SUFFIX)?.to_owned(), shown))
+        let other = here.join(&file);
+        let stem = file.strip_suffix(SUFFIX)?.to_owned();
+        (other != path).then(|| (stem, other.display().to_string()))
     });
     let built_in = names().map(|name| (name.to_owned(), name.to_owned()));
     // Of two that are as near, the first is meant.
@@ -118,7 +126,7 @@ fn model_files(folder: &Path) -> Vec<String> {
     let mut files: Vec<String> = std::fs::read_dir(folder)
         .into_iter()
         .flatten()
-        .take(10_000)
+        .take(MOST_FILES)
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .filter(|name| name.ends_with(SUFFIX) && !name.contains(is_unseen))
         .collect();
