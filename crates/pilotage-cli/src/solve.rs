@@ -5,14 +5,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use pilotage::model::WallBelief;
 use pilotage::policy::{check_writable, write_whole};
-use pilotage::scenario::{self, Scenario, Walls};
-use pilotage::simulate::{Estimate, Evaluation as Earned};
+use pilotage::scenario::{self, Scenario};
+use pilotage::simulate::Estimate;
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
 use pilotage::solve::kbvi::quadratic::MOST_EFFORT;
 use pilotage::solve::lqg::Weights;
-use pilotage::solve::{Form, Solution, SolveSettings, SolverKind, solve};
+use pilotage::solve::{Earned, Form, Solution, SolveSettings, SolverKind, solve};
 use pilotage::solve::{arkaq, kafaq};
 use pilotage_report::{returns_svg, values_svg};
 use serde_json::json;
@@ -261,7 +260,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let curves = arguments.learner.draw(&solution)?;
     let clock = Instant::now();
-    let earned = solution.evaluate(&scenario, arguments.evaluation.options(), &bars)?;
+    let earned = solution.earned(&scenario, arguments.evaluation.options(), &bars)?;
     earned.check()?;
     let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
     let lost = arguments
@@ -336,7 +335,10 @@ fn report(
         "nodes": solution.automaton().map(|automaton| automaton.nodes.len()),
         "planned_value": solution.planned_value,
         "samples": solution.samples,
-        "evaluation": earned,
+        "evaluation_assumed": earned.assumed,
+        "evaluation": earned.world,
+        "upper_bound": serde_json::Value::Null,
+        "remarks": earned.remarks,
         "seconds": { "solve": solve, "evaluate": evaluate },
     })
 }
@@ -353,10 +355,17 @@ fn shown(
     let mut lines = vec![summary::heading(&scenario.model.name, solver.name(), nodes)];
     lines.extend(solution.automaton().map(summary::nodes));
     lines.push(String::new());
-    lines.push(summary::evaluation(earned, solution.planned_value));
-    if scenario.truth.walls == Walls::Clamp && scenario.model.belief.walls == WallBelief::Ignore {
-        lines.push("  the filter does not know of the walls, so the plan expects another return than is earned".to_owned());
-    }
+    lines.push(summary::earned(
+        earned,
+        solution.planned_value,
+        scenario.is_as_assumed(),
+    ));
+    lines.extend(
+        earned
+            .remarks
+            .iter()
+            .map(|remark| format!("  remark: {remark}")),
+    );
     if let Some(horizon) = solution.policy_convergence_horizon {
         lines.push(format!("  policy convergence horizon {horizon}"));
     }
