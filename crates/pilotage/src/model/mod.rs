@@ -5,6 +5,7 @@
 //! ([`crate::scenario::read`]). What is *true* may differ: that is part of a [`crate::scenario::Scenario`], which no planner sees.
 
 mod barriers;
+mod builder;
 mod effects;
 pub(crate) mod error;
 pub(crate) mod map;
@@ -16,6 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use barriers::Barriers;
+pub use builder::{Clause, ModelBuilder};
 pub use effects::{Change, Effect, Outcome, Tally, apart};
 pub use error::{Fault, ModelError, Path, Place, Step, nearest, suggest};
 pub use map::Map;

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::model::{HypothesisBelief, Model, WallBelief};
 use crate::observe::Observer;
 use crate::scenario::{Scenario, Walls};
-use crate::simulate::{Estimate, Evaluation, Options};
+use crate::simulate::{Evaluation, Options};
 
 /// What a solution earns, beside its promise ([`Solution::planned_value`]). All are returns over an episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,7 +41,7 @@ impl Solution {
         let mut remarks = self.remarks.clone();
         let missed = self
             .planned_value
-            .and_then(|planned| missed(planned, &assumed.discounted));
+            .and_then(|planned| missed(planned, &assumed, &scenario.model));
         if let Some(missed) = missed {
             let reasons = reasons(&scenario.model);
             remarks.push(match reasons.is_empty() {
@@ -62,9 +62,13 @@ impl Solution {
 }
 
 /// Says by how much a promise misses what is earned where it should hold, if it does.
-fn missed(planned: f64, earned: &Estimate) -> Option<String> {
+fn missed(planned: f64, assumed: &Evaluation, model: &Model) -> Option<String> {
+    let earned = &assumed.discounted;
+    // What pays once in more episodes than were run may not have been seen.
+    let (low, high) = BeliefMdp::new(model).reward_range();
+    let unseen = (high - low) / assumed.episodes as f64;
     let apart = (planned - earned.mean).abs();
-    let allowed = 3.0 * earned.stderr + SHARE * planned.abs().max(earned.mean.abs());
+    let allowed = unseen + 3.0 * earned.stderr + SHARE * planned.abs().max(earned.mean.abs());
     // Not a number is neither more nor less.
     let holds = apart <= allowed;
     (!holds).then(|| {

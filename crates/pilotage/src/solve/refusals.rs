@@ -2,14 +2,19 @@
 
 use crate::model::{Interval, Model, When};
 
-/// Those that maximise reward need some, discounted.
-pub fn reward_missing(model: &Model) -> Option<String> {
+/// Those that maximise reward need some.
+pub fn nothing_paid(model: &Model) -> Option<String> {
     let pays = !model.rewards.is_empty()
         || !model.events.is_empty()
         || model.episode.failure_reward != 0.0
         || model.cost.is_some();
-    if !pays {
-        return Some("nothing in it pays a reward; add a [[reward]] or a [cost]".to_owned());
+    (!pays).then(|| "nothing in it pays a reward; add a [[reward]] or a [cost]".to_owned())
+}
+
+/// Sums without end need a discount.
+pub fn reward_missing(model: &Model) -> Option<String> {
+    if let Some(reason) = nothing_paid(model) {
+        return Some(reason);
     }
     (model.discount >= 1.0).then(|| {
         "its discount is 1, and a sum without end needs one below 1; set `discount` to 0.99 or less"

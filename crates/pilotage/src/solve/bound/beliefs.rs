@@ -136,7 +136,10 @@ fn effects(frame: &Frame) -> Result<Vec<Vec<Effect>>, String> {
 }
 
 fn effect(frame: &Frame, mode: ModeId, action: ActionId) -> Result<Effect, String> {
-    let (model, hidden) = (frame.model, "it depends on the state whether an event happens");
+    let (model, hidden) = (
+        frame.model,
+        "it depends on the state whether an event happens",
+    );
     let places = [inside(&frame.axes[0].cuts), inside(&frame.axes[1].cuts)];
     let columns = places[1].len();
     let all = || {
@@ -277,14 +280,7 @@ impl<'a> Planner<'a> {
         let (reached, late) = reach(&levels, restarts(frame.model));
         let mut planner = Self {
             ceiling: Ceiling::new(frame.model),
-            lattice: [
-                Axis {
-                    low: 0.0,
-                    step: 1.0,
-                    count: 1,
-                };
-                2
-            ],
+            lattice: [Axis::stepping(0.0, 1.0, 1); 2],
             frame,
             effects,
             reached,
@@ -334,24 +330,24 @@ impl<'a> Planner<'a> {
     /// Variance of the next mean around where it is expected.
     fn spread(&self, level: usize, class: usize) -> Variances {
         let step = self.levels.steps[level][class];
-        let left = step.next.map_or([0.0; 2], |next| self.levels.variances[next]);
+        let left = step
+            .next
+            .map_or([0.0; 2], |next| self.levels.variances[next]);
         std::array::from_fn(|i| (step.predicted[i] - left[i]).max(0.0))
     }
 
     /// About so many points, a whole number of them to every displacement if that can be.
     fn axis(&self, i: usize, count: usize) -> Axis {
         if !self.frame.is_real(i) {
-            return Axis {
-                low: 0.0,
-                step: 1.0,
-                count: 1,
-            };
+            return Axis::stepping(0.0, 1.0, 1);
         }
         let AxisModel { displacement, .. } = &self.frame.axes[i];
         let core = self.frame.core(i);
         let farthest = displacement.iter().fold(0.0, |x: f64, d| x.max(d.abs()));
         let variance = |&level: &usize| {
-            let predicted = self.levels.steps[level].iter().map(|step| step.predicted[i]);
+            let predicted = self.levels.steps[level]
+                .iter()
+                .map(|step| step.predicted[i]);
             predicted.fold(0.0, f64::max)
         };
         let sd = self.late.iter().map(variance).fold(0.0, f64::max).sqrt();
@@ -362,11 +358,7 @@ impl<'a> Planner<'a> {
             Some(measure) if measure >= coarse => measure / (measure / coarse).ceil(),
             _ => coarse,
         };
-        Axis {
-            low,
-            step,
-            count: (width / step).ceil() as usize + 1,
-        }
+        Axis::stepping(low, step, (width / step).ceil() as usize + 1)
     }
 
     fn index(&self, mode: ModeId, level: usize) -> usize {
@@ -465,7 +457,9 @@ impl<'a> Planner<'a> {
     }
 
     fn is_cut(&self, level: usize) -> bool {
-        self.levels.steps[level].iter().any(|step| step.next.is_none())
+        self.levels.steps[level]
+            .iter()
+            .any(|step| step.next.is_none())
     }
 
     fn prepare(&self, level: usize) -> Work {
@@ -537,7 +531,11 @@ impl<'a> Planner<'a> {
         let add = parallel::map(self.size(), |point| {
             paid.expectation(&masses[0][point / sizes[1]], &masses[1][point % sizes[1]])
         });
-        rewards.at.iter_mut().zip(add).for_each(|(r, add)| *r += add);
+        rewards
+            .at
+            .iter_mut()
+            .zip(add)
+            .for_each(|(r, add)| *r += add);
         let mut jumps = [paid.jumps(0), paid.jumps(1)];
         for (i, side) in self.sides() {
             let lines = paid.beyond(i, &self.reach(i, side, &masses[i], map[i]));
@@ -659,7 +657,11 @@ impl<'a> Planner<'a> {
         let of_line = |line: Vec<f64>| dot(&weights, &most_outwards(line, side));
         match i {
             0 => parallel::map(columns, |column| {
-                of_line((0..rows).map(|row| values[row * columns + column]).collect())
+                of_line(
+                    (0..rows)
+                        .map(|row| values[row * columns + column])
+                        .collect(),
+                )
             }),
             _ => values
                 .chunks_exact(columns)
@@ -677,7 +679,10 @@ impl<'a> Planner<'a> {
         for side in 0..2 {
             let end = side * (line.len() - 1);
             let law = Law::normal(self.lattice[i].at(end), spread.sqrt());
-            let most = dot(&law.hats(&self.lattice[i]), &most_outwards(line.to_vec(), side));
+            let most = dot(
+                &law.hats(&self.lattice[i]),
+                &most_outwards(line.to_vec(), side),
+            );
             averaged[end] = averaged[end].max(most);
         }
         averaged
@@ -695,18 +700,36 @@ impl<'a> Planner<'a> {
         }
         let at = |index: usize| {
             let place = index / stride % count;
-            let back = if place > 0 { values[index - stride] } else { values[index] };
-            let on = if place + 1 < count { values[index + stride] } else { values[index] };
+            let back = if place > 0 {
+                values[index - stride]
+            } else {
+                values[index]
+            };
+            let on = if place + 1 < count {
+                values[index + stride]
+            } else {
+                values[index]
+            };
             2.0 * values[index] - back - on
         };
         (0..values.len()).map(at).fold(0.0, f64::max) / self.lattice[i].step
     }
 
     /// The most by which the expectation after an action can lie above its interpolation, along both axes.
-    fn margin(&self, work: &Work, action: ActionId, expected: &Expected, targets: &[Targets; 2]) -> f64 {
+    fn margin(
+        &self,
+        work: &Work,
+        action: ActionId,
+        expected: &Expected,
+        targets: &[Targets; 2],
+    ) -> f64 {
         let spread = self.spread(work.level, self.frame.class_of[action]);
         let along = |i: usize| {
-            let (step, a, bend) = (self.lattice[i].step, self.frame.axes[i].a.abs(), expected.bend[i]);
+            let (step, a, bend) = (
+                self.lattice[i].step,
+                self.frame.axes[i].a.abs(),
+                expected.bend[i],
+            );
             let aligned = targets[i].aligned;
             let sd = spread[i].sqrt();
             // Kinks that stay where they are lie on points. Elsewhere a function that bends by `bend` in a cell may lie as much
@@ -764,8 +787,14 @@ impl<'a> Planner<'a> {
             for (i, side) in self.sides() {
                 let mut most = rewards.beyond[i][side].clone();
                 if goes_on {
-                    let to_come =
-                        self.beyond(effect.mode, work, action, (i, side), &targets[action], ceiling);
+                    let to_come = self.beyond(
+                        effect.mode,
+                        work,
+                        action,
+                        (i, side),
+                        &targets[action],
+                        ceiling,
+                    );
                     let pairs = most.iter_mut().zip(&to_come);
                     pairs.for_each(|(most, value)| *most += model.discount * value);
                 }
@@ -808,14 +837,16 @@ impl<'a> Planner<'a> {
         let averaged = self.average_line(&line, other, &work.kernels[class][other], spread[other]);
         let places = targets[other].places.iter().enumerate();
         places
-            .map(|(point, &(below, on))| match self.outer_side(other, point) {
-                Some(side) => {
-                    let weights = law(other, side).hats(&self.lattice[other]);
-                    dot(&weights, &most_outwards(line.clone(), side))
-                }
-                None if on == 0.0 => averaged[below],
-                None => averaged[below] + on * (averaged[below + 1] - averaged[below]),
-            })
+            .map(
+                |(point, &(below, on))| match self.outer_side(other, point) {
+                    Some(side) => {
+                        let weights = law(other, side).hats(&self.lattice[other]);
+                        dot(&weights, &most_outwards(line.clone(), side))
+                    }
+                    None if on == 0.0 => averaged[below],
+                    None => averaged[below] + on * (averaged[below + 1] - averaged[below]),
+                },
+            )
             .collect()
     }
 
@@ -934,9 +965,7 @@ fn interpolate(
 fn product(values: &[f64], weights: &[Vec<f64>; 2]) -> f64 {
     let rows = values.chunks_exact(weights[1].len()).zip(&weights[0]);
     rows.filter(|(_, weight)| **weight > 0.0)
-        .map(|(row, weight)| {
-            weight * row.iter().zip(&weights[1]).map(|(v, w)| v * w).sum::<f64>()
-        })
+        .map(|(row, weight)| weight * row.iter().zip(&weights[1]).map(|(v, w)| v * w).sum::<f64>())
         .sum()
 }
 

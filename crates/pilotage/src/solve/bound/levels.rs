@@ -33,16 +33,15 @@ pub(super) struct Levels {
 
 impl Levels {
     /// At most so many levels: the closer two may be and still be two, the fewer are needed.
-    pub fn new(
-        a: [f64; 2],
-        classes: &[[Noise; 2]],
-        starts: &[Variances],
-        limit: usize,
-    ) -> Self {
+    pub fn new(a: [f64; 2], classes: &[[Noise; 2]], starts: &[Variances], limit: usize) -> Self {
         let mut tolerance = 1e-6;
         loop {
             let levels = Self::within(a, classes, starts, limit, tolerance);
-            let cut = levels.steps.iter().flatten().any(|step| step.next.is_none());
+            let cut = levels
+                .steps
+                .iter()
+                .flatten()
+                .any(|step| step.next.is_none());
             tolerance *= 4.0;
             if !cut || tolerance > 0.1 {
                 return levels;
@@ -146,8 +145,7 @@ impl Levels {
 
 /// One step of the Riccati recursion along each axis: before and after the reading.
 fn advance(a: [f64; 2], class: &[Noise; 2], from: Variances) -> (Variances, Variances) {
-    let predicted: Variances =
-        std::array::from_fn(|i| a[i] * a[i] * from[i] + class[i].motion);
+    let predicted: Variances = std::array::from_fn(|i| a[i] * a[i] * from[i] + class[i].motion);
     let left = std::array::from_fn(|i| {
         // Also where nothing is left to be told, so that an endless precision is none.
         match predicted[i] > 0.0 {

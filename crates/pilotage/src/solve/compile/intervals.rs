@@ -18,7 +18,8 @@ struct Run {
 
 /// Adds the nodes of a band.
 pub fn place(automaton: &mut Automaton, policy: &dyn Policy, band: &Band) {
-    let means = band.decisions.iter().map(|(mean, _)| mean[0]);
+    let decided = band.decisions.iter().map(|(mean, _)| mean[0]);
+    let means = decided.chain(band.beside.iter().map(|mean| mean[0]));
     let (low, high) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
         (low.min(x), high.max(x))
     });

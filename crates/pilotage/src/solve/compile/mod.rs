@@ -11,6 +11,9 @@ mod samples;
 
 pub use annotate::annotate;
 
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+
 use crate::belief::{Belief, BeliefMdp, LevelId};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, ModeId};
@@ -46,6 +49,41 @@ struct Band {
     mode: ModeId,
     levels: (LevelId, LevelId),
     decisions: Vec<(Vec<f64>, ActionId)>,
+    /// Means at which a belief may be besides, although the policy itself does not lead there.
+    beside: Vec<Vec<f64>>,
+}
+
+/// Beliefs of one mode and level.
+#[derive(Default)]
+struct Met {
+    /// Where the policy decided, and what.
+    decisions: Vec<(Vec<f64>, ActionId)>,
+    /// Means that were met when it was disturbed.
+    beside: Vec<Vec<f64>>,
+}
+
+/// A policy whose hand slips now and then: at a tenth of all beliefs it does anything. Which beliefs these are is a matter of their
+/// numbers, so that nothing depends on the order of asking.
+struct Disturbed<'a> {
+    policy: &'a dyn Policy,
+    actions: usize,
+    seed: u64,
+}
+
+impl Policy for Disturbed<'_> {
+    fn action(&self, belief: &Belief) -> ActionId {
+        const SHARE: u64 = 10;
+        let bits = belief.mean.iter().map(|mean| mean.to_bits());
+        let numbers = bits.chain([belief.level as u64, belief.mode as u64]);
+        let mixed = numbers.fold(self.seed, |hash, number| {
+            let mixed = (hash ^ number).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            mixed ^ (mixed >> 29)
+        });
+        match mixed % SHARE {
+            0 => (mixed / SHARE) as usize % self.actions,
+            _ => self.policy.action(belief),
+        }
+    }
 }
 
 /// Compiles a policy into an automaton named after `solver`.
@@ -73,17 +111,10 @@ pub fn compile(
         });
     }
     let model = mdp.model();
-    let met = rollout::decisions(
-        mdp,
-        &mdp.filter(),
-        policy,
-        settings.episodes,
-        model.episode.length,
-        settings.seed,
-    );
+    let met = meet(mdp, policy, settings);
     let mut automaton = Automaton::new(mdp, solver, settings.matching);
     automaton.planned_value = policy.value(mdp.start());
-    for band in bands(mdp, policy, &met.concat(), settings.slack) {
+    for band in bands(mdp, policy, met, settings.slack) {
         if model.state_dim() == 1 {
             intervals::place(&mut automaton, policy, &band);
         } else {
@@ -94,48 +125,87 @@ pub fn compile(
     Ok(automaton)
 }
 
+/// The beliefs that a policy meets in the world its model assumes, and those that it meets when it is disturbed, by mode and level.
+///
+/// Without the latter a policy would have nothing to say once anything is a little otherwise than assumed.
+fn meet(
+    mdp: &BeliefMdp,
+    policy: &dyn Policy,
+    settings: &Settings,
+) -> BTreeMap<(ModeId, Reverse<LevelId>), Met> {
+    let disturbed = Disturbed {
+        policy,
+        actions: mdp.model().actions.len(),
+        seed: settings.seed,
+    };
+    let run = |policy: &dyn Policy, episodes| {
+        let length = mdp.model().episode.length;
+        rollout::decisions(mdp, &mdp.filter(), policy, episodes, length, settings.seed).concat()
+    };
+    let mut met: BTreeMap<_, Met> = BTreeMap::new();
+    let place = |belief: &Belief| (belief.mode, Reverse(belief.level));
+    for Decision { belief, action, .. } in run(policy, settings.episodes) {
+        let met = met.entry(place(&belief)).or_default();
+        met.decisions.push((belief.mean, action));
+    }
+    for Decision { belief, .. } in run(&disturbed, settings.episodes.div_ceil(4)) {
+        met.entry(place(&belief))
+            .or_default()
+            .beside
+            .push(belief.mean);
+    }
+    for (&(mode, Reverse(level)), met) in &mut met {
+        if !met.decisions.is_empty() {
+            continue;
+        }
+        let decided = met.beside.iter().map(|mean| {
+            let mean = mean.clone();
+            let belief = Belief { level, mode, mean };
+            let action = policy.action(&belief);
+            (belief.mean, action)
+        });
+        met.decisions = decided.collect();
+    }
+    met
+}
+
 /// Joins neighbouring levels, from the most certain upwards, as long as the policy at the band's first level, asked at the
 /// beliefs of the next, gives the same actions but for the slack.
-fn bands(mdp: &BeliefMdp, policy: &dyn Policy, met: &[Decision], slack: f64) -> Vec<Band> {
+fn bands(
+    mdp: &BeliefMdp,
+    policy: &dyn Policy,
+    met: BTreeMap<(ModeId, Reverse<LevelId>), Met>,
+    slack: f64,
+) -> Vec<Band> {
     let mut bands: Vec<Band> = Vec::new();
-    for mode in 0..mdp.model().modes.len() {
-        for level in (0..mdp.levels().len()).rev() {
-            let here = met
-                .iter()
-                .filter(|decision| decision.belief.mode == mode && decision.belief.level == level);
-            let decisions: Vec<(Vec<f64>, ActionId)> = here
-                .map(|decision| (decision.belief.mean.clone(), decision.action))
-                .collect();
-            if decisions.is_empty() {
-                continue;
-            }
-            let joins = bands.last().is_some_and(|band| {
-                let differs = |(mean, action): &(Vec<f64>, ActionId)| {
-                    policy.action(&Belief {
-                        level: band.levels.1,
-                        mode,
-                        mean: mean.clone(),
-                    }) != *action
-                };
-                let apart = decisions
-                    .iter()
-                    .filter(|decision| differs(decision))
-                    .count() as f64;
-                band.mode == mode
-                    && band.levels.0 == level + 1
-                    && apart <= slack * decisions.len() as f64
-            });
-            match bands.last_mut() {
-                Some(band) if joins => {
-                    band.levels.0 = level;
-                    band.decisions.extend(decisions);
-                }
-                _ => bands.push(Band {
+    for ((mode, Reverse(level)), Met { decisions, beside }) in met {
+        if mdp.levels().is_over(level) {
+            continue;
+        }
+        let joins = bands.last().is_some_and(|band| {
+            let differs = |(mean, action): &&(Vec<f64>, ActionId)| {
+                policy.action(&Belief {
+                    level: band.levels.1,
                     mode,
-                    levels: (level, level),
-                    decisions,
-                }),
+                    mean: mean.clone(),
+                }) != *action
+            };
+            band.mode == mode
+                && band.levels.0 == level + 1
+                && decisions.iter().filter(differs).count() as f64 <= slack * decisions.len() as f64
+        });
+        match bands.last_mut() {
+            Some(band) if joins => {
+                band.levels.0 = level;
+                band.decisions.extend(decisions);
+                band.beside.extend(beside);
             }
+            _ => bands.push(Band {
+                mode,
+                levels: (level, level),
+                decisions,
+                beside,
+            }),
         }
     }
     bands

@@ -149,7 +149,11 @@ impl State {
                 break;
             }
             previous = at_steady.then_some((acting, action, step.reward));
-            if self.experience.samples.is_multiple_of(settings.epoch as u64) {
+            if self
+                .experience
+                .samples
+                .is_multiple_of(settings.epoch as u64)
+            {
                 self.temperature = (self.temperature * settings.cooling).max(settings.cold);
                 let reward = self.reward / settings.epoch as f64;
                 self.curve

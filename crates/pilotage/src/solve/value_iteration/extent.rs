@@ -26,13 +26,22 @@ pub(super) fn axes(mdp: &BeliefMdp, settings: &Settings) -> Result<Vec<Axis>> {
     };
     let axes: Vec<Axis> = (0..n).map(|variable| axis(mdp, variable, points)).collect();
     within_reach(model, &axes)?;
-    let axes: Vec<Axis> = axes
-        .iter()
-        .enumerate()
-        .map(|(variable, axis)| fine_enough(mdp, settings, variable, axis))
-        .collect::<Result<_>>()?;
-    let count = |total: u64, axis: &Axis| total.saturating_mul(axis.count as u64);
-    let total = axes.iter().fold(1, count);
+    let size = |axes: &[Axis]| {
+        let count = |total: u64, axis: &Axis| total.saturating_mul(axis.count as u64);
+        axes.iter().fold(1, count)
+    };
+    let wanted = match settings.points {
+        Some(_) => axes.clone(),
+        None => (axes.iter().enumerate())
+            .map(|(variable, axis)| refined(axis, scale(mdp, variable, FINE)))
+            .collect(),
+    };
+    let axes = match mebibytes(mdp, size(&wanted)) <= settings.memory {
+        true => wanted,
+        false => axes,
+    };
+    resolves(mdp, &axes)?;
+    let total = size(&axes);
     let mebibytes = mebibytes(mdp, total);
     if mebibytes > settings.memory {
         return Err(Error::TooLarge {
@@ -146,37 +155,61 @@ fn paid_places(model: &Model) -> impl Iterator<Item = (String, &Region)> {
     rewards.chain(events.map(|(i, event)| (format!("event {}", i + 1), &event.region)))
 }
 
-/// Points so close that no reward falls between two of them: the expected reward of a belief changes over a length of the place it is paid
-/// in, or of the belief's own width where that is more.
-fn fine_enough(mdp: &BeliefMdp, settings: &Settings, variable: usize, axis: &Axis) -> Result<Axis> {
-    let model = mdp.model();
+/// Points to a place where something is paid, where the default of the grid can be chosen; and the least that will do.
+const FINE: f64 = 20.0;
+const COARSE: f64 = 2.0;
+
+/// How far apart points may be along a variable: the expected reward of a belief changes over a length of the narrowest place where
+/// something is paid, which `points` of them resolve, or over the belief's own width where that is more, which two do.
+fn scale(mdp: &BeliefMdp, variable: usize, points: f64) -> f64 {
     let variance = |level| mdp.levels().covariance(level)[(variable, variable)];
     let least = (0..mdp.levels().len())
         .map(variance)
         .fold(f64::INFINITY, f64::min);
-    let narrowest = paid_places(model)
-        .map(|(what, region)| (region.side(variable).width(), what))
-        .filter(|(width, _)| width.is_finite())
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((width, what)) = narrowest else {
-        return Ok(*axis);
-    };
-    let length = width.max(least.max(0.0).sqrt());
-    if axis.step <= 0.5 * length {
-        return Ok(*axis);
+    let widths = paid_places(mdp.model()).map(|(_, region)| region.side(variable).width());
+    let narrowest = widths.fold(f64::INFINITY, f64::min);
+    (narrowest / points).max(0.5 * least.max(0.0).sqrt())
+}
+
+/// The axis with points no farther apart than that.
+fn refined(axis: &Axis, apart: f64) -> Axis {
+    const MOST: f64 = 1e7;
+    let factor = (axis.step / apart).ceil().min(MOST / axis.count as f64);
+    match factor > 1.0 {
+        true => axis.finer(factor as usize),
+        false => *axis,
     }
-    let factor = (axis.step / (0.5 * length)).ceil();
-    let needed = (axis.count as f64 - 1.0) * factor + 1.0;
-    if settings.points.is_some() || needed > 1e7 {
+}
+
+/// Without the last digits of a difference.
+fn rounded(length: f64) -> f64 {
+    (length * 1e9).round() / 1e9
+}
+
+/// Whether nothing that is paid falls between two points.
+fn resolves(mdp: &BeliefMdp, axes: &[Axis]) -> Result<()> {
+    let model = mdp.model();
+    for (variable, axis) in axes.iter().enumerate() {
+        let apart = scale(mdp, variable, COARSE);
+        if axis.step <= apart {
+            continue;
+        }
+        let width = |region: &Region| region.side(variable).width();
+        let narrowest = paid_places(model).min_by(|a, b| width(a.1).total_cmp(&width(b.1)));
+        let what = narrowest.map_or_else(String::new, |(what, region)| {
+            format!("{what} is {} wide", rounded(width(region)))
+        });
         return Err(unsupported(
             model,
             format!(
-                "{what} is {width} wide along {}, and the points of the grid are {} apart; give at least {needed} points (--grid), or narrower bounds",
-                model.state[variable].name, axis.step
+                "{what} along {}, and the points of the grid are {} apart; give at least {} points (--grid), more memory, or narrower bounds",
+                model.state[variable].name,
+                rounded(axis.step),
+                ((axis.count - 1) as f64 * axis.step / apart).ceil() + 1.0
             ),
         ));
     }
-    Ok(axis.finer(factor as usize))
+    Ok(())
 }
 
 /// Functions kept on the grid: values, expectations and probabilities of failing.

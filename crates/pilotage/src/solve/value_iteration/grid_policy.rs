@@ -24,7 +24,8 @@ use crate::error::{Error, Result};
 use crate::model::{ActionId, Then};
 use crate::observe::Observer;
 use crate::policy::Policy;
-use crate::solve::grid::{Grid, Interpolation, Settings, Smoother};
+use crate::solve::grid::{Axis, Grid, Interpolation, Settings, Smoother};
+use crate::solve::rollout;
 use crate::solve::walled::WalledSmoother;
 
 /// The value on the grid, and the policy that looks one step ahead from any belief.
@@ -55,7 +56,11 @@ pub struct GridPolicy {
 /// [`Error::Unsupported`] where the grid does not see what is paid, [`Error::NotFinite`] where numbers grow beyond all bounds.
 pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> Result<GridPolicy> {
     settings.validate()?;
-    super::horizon::plan(mdp, settings, observer)
+    let mut policy = super::horizon::plan(mdp, settings, observer)?;
+    if let Some(remark) = policy.strays() {
+        policy.remarks.push(remark);
+    }
+    Ok(policy)
 }
 
 /// Plans for episodes that are as long as the levels of the decision process say: for ever, unless they tell the time.
@@ -149,6 +154,34 @@ impl GridPolicy {
     /// What is to be known of the plan: where it is not what it seems, and why.
     pub fn remarks(&self) -> &[String] {
         &self.remarks
+    }
+
+    /// Says so if the plan meets beliefs beyond its grid, where it knows nothing.
+    fn strays(&self) -> Option<String> {
+        const EPISODES: usize = 50;
+        const SHARE: f64 = 0.01;
+        let (filter, length) = (self.mdp.filter(), self.mdp.model().episode.length.min(1000));
+        let met = rollout::decisions(&self.mdp, &filter, self, EPISODES, length, 1).concat();
+        let axes = self.grid.axes();
+        let beyond = |axis: &Axis, x: f64| x < axis.low || x > axis.at(axis.count - 1);
+        let beyond = |i: usize| {
+            let outside = met
+                .iter()
+                .filter(|decision| beyond(&axes[i], decision.belief.mean[i]));
+            (outside.count() as f64 / met.len() as f64, i)
+        };
+        let (share, i) = (0..axes.len())
+            .map(beyond)
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (share > SHARE).then(|| {
+            format!(
+                "grid edge: {:.0} % of the beliefs that the plan meets lie beyond its grid, {} from {} to {}, where it knows nothing; widen `state.bounds`",
+                100.0 * share,
+                self.mdp.model().state[i].name,
+                axes[i].low,
+                axes[i].at(axes[i].count - 1)
+            )
+        })
     }
 
     /// Value of the levels at which an episode is over.

@@ -45,7 +45,7 @@ impl Planner for ValueIteration {
     fn accepts(&self, model: &Model) -> Result<()> {
         let n = model.state_dim();
         let fits = n <= extent::MOST_VARIABLES || self.grid.points.is_some();
-        let reason = refusals::reward_missing(model)
+        let reason = refusals::nothing_paid(model)
             .or_else(|| (!fits).then(|| extent::too_many_variables(n)))
             .or_else(|| refusals::bound_missing(model));
         refuse_if(SOLVER, model, reason)
