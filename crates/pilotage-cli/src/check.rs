@@ -7,7 +7,7 @@ use clap::Args;
 use pilotage::Error;
 use pilotage::belief::BeliefMdp;
 use pilotage::scenario;
-use pilotage::solve::SolverKind;
+use pilotage::solve::Registry;
 use serde_json::json;
 
 use crate::failure::Failure;
@@ -32,6 +32,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Ok(());
     };
     let model = scenario::find(file)?.model;
+    let registry = Registry::builtin();
     let mdp = BeliefMdp::new(&model);
     let levels = mdp.levels();
     levels.check(&model)?;
@@ -55,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "levels": levels.len(),
             "start_deviation": sd(levels.starts()[0]),
             "steady_deviation": steady.map(sd),
-            "solvers": SolverKind::ALL.iter().filter(|solver| solver.accepts(&model).is_ok()).map(|solver| solver.name()).collect::<Vec<_>>(),
+            "solvers": registry.entries().iter().filter(|solver| solver.accepts(&model).is_ok()).map(|solver| solver.name()).collect::<Vec<_>>(),
         });
         writeln!(out, "{report}")?;
         return Ok(());
@@ -117,13 +118,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             deviations(sd(steady))
         )?;
     }
-    for solver in SolverKind::ALL {
+    for solver in registry.entries() {
         match solver.accepts(&model) {
-            Ok(()) => writeln!(out, "  {:<12} can solve it", solver.name())?,
+            Ok(()) => writeln!(out, "  {:<15} can solve it", solver.name())?,
             Err(Error::Unsupported { reason, .. }) => {
-                writeln!(out, "  {:<12} cannot: {reason}", solver.name())?;
+                writeln!(out, "  {:<15} cannot: {reason}", solver.name())?;
             }
-            Err(error) => writeln!(out, "  {:<12} cannot: {error}", solver.name())?,
+            Err(error) => writeln!(out, "  {:<15} cannot: {error}", solver.name())?,
         }
     }
     Ok(())

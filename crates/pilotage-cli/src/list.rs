@@ -6,7 +6,7 @@ use clap::Args;
 use comfy_table::presets;
 use comfy_table::{ContentArrangement, Table};
 use pilotage::scenario;
-use pilotage::solve::SolverKind;
+use pilotage::solve::Registry;
 use serde_json::json;
 
 use crate::failure::Failure;
@@ -22,12 +22,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let models = scenario::names()
         .map(|name| scenario::find(name).map(|scenario| scenario.model))
         .collect::<Result<Vec<_>, _>>()?;
+    let registry = Registry::builtin();
     let mut out = std::io::stdout().lock();
     if arguments.json {
         let problems: Vec<_> = models
             .iter()
             .map(|model| {
-                let accepted: Vec<_> = SolverKind::ALL.iter().filter(|solver| solver.accepts(model).is_ok()).map(|solver| solver.name()).collect();
+                let accepted: Vec<_> = registry.entries().iter().filter(|solver| solver.accepts(model).is_ok()).map(|solver| solver.name()).collect();
                 json!({ "name": model.name, "about": model.about, "states": model.state_dim(), "actions": model.actions.len(), "solvers": accepted })
             })
             .collect();
@@ -52,7 +53,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         ]);
     }
     writeln!(out, "{}\n", table.trim_fmt())?;
-    let solvers: Vec<_> = SolverKind::ALL.iter().map(|solver| solver.name()).collect();
+    let solvers: Vec<_> = registry
+        .entries()
+        .iter()
+        .map(|solver| solver.name())
+        .collect();
     writeln!(out, "solvers: {}", solvers.join(", "))?;
     Ok(())
 }

@@ -3,11 +3,11 @@
 mod check;
 mod draw;
 mod failure;
-mod learner_help;
 mod list;
 mod options;
 mod progress;
 mod reproduce;
+mod settings_help;
 mod simulate;
 mod solve;
 mod summary;
@@ -25,7 +25,7 @@ use failure::Failure;
     version,
     max_term_width = 100,
     arg_required_else_help = true,
-    after_help = "`pilotage solve --help` lists the settings of planners and learners."
+    after_help = "`pilotage solve --help` lists the settings of every solver."
 )]
 struct Cli {
     #[command(subcommand)]

@@ -8,28 +8,24 @@ use clap::{Args, ValueEnum};
 use pilotage::policy::{check_writable, write_whole};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Estimate;
-use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
-use pilotage::solve::kbvi::quadratic::MOST_EFFORT;
-use pilotage::solve::lqg::Weights;
-use pilotage::solve::{Earned, Form, Solution, SolveSettings, SolverKind, solve};
-use pilotage::solve::{arkaq, kafaq};
+use pilotage::solve::{Earned, Entry, Form, Registry, Request, Solution, Solver, solve};
 use pilotage_report::{returns_svg, values_svg};
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::learner_help::learner_settings;
 use crate::options::{Evaluation, at_least_one, beside, quoted, shown as shown_path};
 use crate::progress::Bars;
+use crate::settings_help::settings_of_solvers;
 use crate::summary;
 
 #[derive(Args)]
-#[command(after_help = learner_settings())]
+#[command(after_help = settings_of_solvers())]
 pub struct Arguments {
     /// Name of a built-in problem (see `pilotage list`), or a model file.
     problem: PathBuf,
-    /// Solver to use (see `pilotage list`).
-    #[arg(long, value_name = "SOLVER", default_value = "kbvi-closed")]
-    with: String,
+    /// Solver to use (see `pilotage list`); default: the first planner that accepts the problem.
+    #[arg(long, value_name = "SOLVER")]
+    with: Option<String>,
     /// Form of the policy: nearest, segments, or grid (the planner itself, not compiled).
     #[arg(long, value_name = "FORM", default_value = "nearest")]
     policy: String,
@@ -45,34 +41,9 @@ pub struct Arguments {
     #[command(flatten)]
     evaluation: Evaluation,
     #[command(flatten)]
-    planner: Planner,
+    told: Told,
     #[command(flatten)]
     learner: Learner,
-}
-
-/// What the files of the curves end in.
-const CURVES: [&str; 2] = ["returns.svg", "values.svg"];
-
-#[derive(Args)]
-#[command(next_help_heading = "Learner settings")]
-struct Learner {
-    /// Keep the state of learning in this file, and go on from there if it exists.
-    #[arg(long, value_name = "FILE")]
-    checkpoint: Option<PathBuf>,
-    /// Draw how learning went: FILE-returns.svg and FILE-values.svg.
-    #[arg(long, value_name = "FILE")]
-    curves: Option<PathBuf>,
-    /// A setting of the learner by name, such as lambda=0.5; may be given more than once. Listed below.
-    #[arg(long, value_name = "KEY=VALUE", value_parser = key_and_value)]
-    learn: Vec<(String, String)>,
-}
-
-fn factor(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(factor) if factor > 0.0 && factor <= MOST_EFFORT => Ok(factor),
-        Ok(_) => Err(format!("must be above 0, at most {MOST_EFFORT}")),
-        Err(error) => Err(format!("{error}")),
-    }
 }
 
 fn key_and_value(text: &str) -> Result<(String, String), String> {
@@ -83,24 +54,9 @@ fn key_and_value(text: &str) -> Result<(String, String), String> {
 }
 
 impl Learner {
-    /// A learner's settings with those given by name; the seed is the run's.
-    fn settings<S: Default>(
-        &self,
-        set: impl Fn(&mut S, &str, &str) -> pilotage::Result<()>,
-    ) -> Result<S, Failure> {
-        let mut settings = S::default();
-        for (key, value) in &self.learn {
-            if key == "seed" {
-                return Err(Failure::Usage("the seed is set by --seed".to_owned()));
-            }
-            set(&mut settings, key, value)?;
-        }
-        Ok(settings)
-    }
-
     /// Whether any of it was asked for.
     fn is_given(&self) -> bool {
-        self.checkpoint.is_some() || self.curves.is_some() || !self.learn.is_empty()
+        self.checkpoint.is_some() || self.curves.is_some()
     }
 
     /// Draws the curves that were asked for; returns their files.
@@ -125,35 +81,38 @@ impl Learner {
 }
 
 #[derive(Args)]
-#[command(next_help_heading = "Planner settings")]
-struct Planner {
-    /// Points of the grid along each variable.
-    #[arg(long, value_name = "POINTS")]
-    grid: Option<usize>,
-    /// Most memory for the grid, MiB.
-    #[arg(long, value_name = "MIB", default_value_t = SolveSettings::default().memory)]
-    memory: u64,
-    /// First horizon that kbvi tries.
-    #[arg(long, value_name = "STEPS", default_value_t = *SolveSettings::default().horizons.start())]
-    first_horizon: usize,
-    /// Last horizon that kbvi tries.
-    #[arg(long, value_name = "STEPS", default_value_t = *SolveSettings::default().horizons.end())]
-    last_horizon: usize,
-    /// Steps for which kbvi keeps an action once chosen.
-    #[arg(long, value_name = "STEPS", default_value_t = 1, value_parser = at_least_one)]
-    group: usize,
-    /// Episodes a planner runs to see which beliefs its policy meets.
+#[command(next_help_heading = "Solver settings")]
+struct Told {
+    /// A setting of the solver by name, such as points=401; may be given more than once. All are listed below.
+    #[arg(long, visible_alias = "learn", value_name = "KEY=VALUE", value_parser = key_and_value)]
+    set: Vec<(String, String)>,
+    /// Episodes run to see which beliefs a policy meets.
     #[arg(long, value_name = "EPISODES", value_parser = at_least_one)]
     runs: Option<usize>,
+    /// Points of a grid along each variable.
+    #[arg(long, value_name = "POINTS")]
+    grid: Option<usize>,
+    /// Most memory for a grid, MiB.
+    #[arg(long, value_name = "MIB")]
+    memory: Option<u64>,
+    /// First horizon that kbvi tries.
+    #[arg(long, value_name = "STEPS")]
+    first_horizon: Option<usize>,
+    /// Last horizon that kbvi tries.
+    #[arg(long, value_name = "STEPS")]
+    last_horizon: Option<usize>,
+    /// Steps for which kbvi keeps an action once chosen.
+    #[arg(long, value_name = "STEPS", value_parser = at_least_one)]
+    group: Option<usize>,
     /// Factor on the length of a policy search's simulations: less is faster, more is thorougher.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
-    effort: f64,
+    #[arg(long, value_name = "FACTOR")]
+    effort: Option<f64>,
     /// kbvi looks less far ahead with every step of an episode.
     #[arg(long)]
     decreasing: bool,
     /// Formulas kbvi uses.
-    #[arg(long, value_enum, default_value_t = Formula::Exact)]
-    formulas: Formula,
+    #[arg(long, value_enum)]
+    formulas: Option<Formula>,
     /// What a deviation of each state variable costs lqg, comma-separated; default: the model's own cost, or 1 at each limit.
     #[arg(long, value_name = "WEIGHTS", value_delimiter = ',')]
     state_weights: Option<Vec<f64>>,
@@ -174,19 +133,17 @@ enum Formula {
 }
 
 impl Formula {
-    fn set(self) -> Formulas {
-        match self {
-            Self::Exact => Formulas::default(),
-            Self::Ramp => Formulas {
-                reward: RewardFormula::Ramp,
-                ..Formulas::default()
-            },
-            Self::Printed => Formulas {
-                reward: RewardFormula::Ramp,
-                spread: SpreadFormula::Printed,
-                integral: IntegralFormula::Printed,
-            },
-        }
+    fn settings(self) -> [(&'static str, &'static str); 3] {
+        let (reward, others) = match self {
+            Self::Exact => ("exact", "exact"),
+            Self::Ramp => ("ramp", "exact"),
+            Self::Printed => ("ramp", "printed"),
+        };
+        [
+            ("reward_formula", reward),
+            ("spread_formula", others),
+            ("integral_formula", others),
+        ]
     }
 }
 
@@ -200,60 +157,144 @@ impl Arguments {
         }
         Ok(())
     }
+}
 
-    fn settings(&self, solver: SolverKind) -> Result<SolveSettings, Failure> {
-        Ok(SolveSettings {
-            form: Form::parse(&self.policy)?,
-            seed: self.evaluation.seed,
-            points: self.planner.grid,
-            memory: self.planner.memory,
-            horizons: self.planner.first_horizon..=self.planner.last_horizon,
-            runs: self.planner.runs,
-            group: self.planner.group,
-            effort: self.planner.effort,
-            decreasing: self.planner.decreasing,
-            formulas: self.planner.formulas.set(),
-            weights: Weights {
-                state: self.planner.state_weights.clone(),
-                control: self.planner.control_weights.clone(),
-            },
-            kafaq: if solver == SolverKind::Arkaq {
-                kafaq::Settings::default()
-            } else {
-                self.learner.settings(kafaq::Settings::set)?
-            },
-            arkaq: if solver == SolverKind::Arkaq {
-                self.learner.settings(arkaq::Settings::set)?
-            } else {
-                arkaq::Settings::default()
-            },
-            checkpoint: self.learner.checkpoint.clone(),
-        })
+impl Told {
+    /// Options that are settings of some solvers: option, setting and value.
+    fn options(&self) -> Vec<(&'static str, &'static str, String)> {
+        let number = |option, setting, value: Option<usize>| {
+            value.map(|value| (option, setting, value.to_string()))
+        };
+        let list = |option, setting, value: &Option<Vec<f64>>| {
+            value
+                .as_ref()
+                .map(|value| (option, setting, format!("{value:?}")))
+        };
+        let memory = self
+            .memory
+            .map(|mib| ("--memory", "memory", mib.to_string()));
+        let effort = self
+            .effort
+            .map(|factor| ("--effort", "effort", format!("{factor:?}")));
+        let decreasing = self
+            .decreasing
+            .then(|| ("--decreasing", "decreasing", "true".to_owned()));
+        let formulas = self.formulas.into_iter().flat_map(Formula::settings);
+        [
+            number("--grid", "points", self.grid),
+            memory,
+            number("--first-horizon", "first_horizon", self.first_horizon),
+            number("--last-horizon", "last_horizon", self.last_horizon),
+            number("--group", "group", self.group),
+            effort,
+            decreasing,
+            list("--state-weights", "state_weights", &self.state_weights),
+            list(
+                "--control-weights",
+                "control_weights",
+                &self.control_weights,
+            ),
+        ]
+        .into_iter()
+        .flatten()
+        .chain(formulas.map(|(setting, word)| ("--formulas", setting, word.to_owned())))
+        .collect()
+    }
+
+    /// The solver with the settings given, and the episodes to compile with where it does not count its own.
+    fn solver(&self, registry: &Registry, entry: &Entry) -> Result<(Solver, usize), Failure> {
+        let has =
+            |entry: &Entry, setting: &str| entry.settings().iter().any(|info| info.name == setting);
+        let mut settings = Vec::new();
+        for (option, setting, value) in self.options() {
+            if !has(entry, setting) {
+                return Err(without(registry, entry, option, setting));
+            }
+            settings.push((setting.to_owned(), value));
+        }
+        let mut runs = Request::default().runs;
+        match self.runs {
+            Some(asked) if has(entry, "runs") => {
+                settings.push(("runs".to_owned(), asked.to_string()));
+            }
+            asked => runs = asked.unwrap_or(runs),
+        }
+        for (setting, value) in &self.set {
+            if setting == "seed" {
+                return Err(Failure::Usage("the seed is set by --seed".to_owned()));
+            }
+            let others = registry.entries();
+            if !has(entry, setting) && others.iter().any(|other| has(other, setting)) {
+                return Err(without(registry, entry, setting, setting));
+            }
+            settings.push((setting.clone(), value.clone()));
+        }
+        Ok((entry.solver(&settings)?, runs))
     }
 }
 
+/// Something that another solver can be told, and not this one.
+fn without(registry: &Registry, entry: &Entry, what: &str, setting: &str) -> Failure {
+    let names = |entry: &Entry| -> Vec<String> {
+        let settings = entry.settings().into_iter();
+        settings.map(|info| info.name).collect()
+    };
+    let others = registry.entries().iter();
+    let others = others.filter(|other| names(other).iter().any(|name| name == setting));
+    let others: Vec<String> = others
+        .map(|other| format!("--with {}", other.name()))
+        .collect();
+    Failure::Usage(format!(
+        "{what} is for {}; {} has the settings `{}`",
+        others.join(" or "),
+        entry.name(),
+        names(entry).join("`, `")
+    ))
+}
+
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let solver = SolverKind::parse(&arguments.with)?;
-    let settings = arguments.settings(solver)?;
-    if arguments.out.is_some() && settings.form == Form::Grid {
+    let form = Form::parse(&arguments.policy)?;
+    let registry = Registry::builtin();
+    let named = arguments.with.as_deref();
+    let named = named.map(|name| registry.find(name)).transpose()?;
+    if arguments.out.is_some() && form == Form::Grid {
         return Err(Failure::Usage(
             "a planner that is not compiled cannot be saved; choose --policy nearest or segments"
                 .to_owned(),
         ));
     }
-    if arguments.learner.is_given() && !solver.learns() {
+    let scenario = scenario::find(&arguments.problem)?;
+    let entry = match named {
+        Some(entry) => entry,
+        None => registry.first_for(&scenario.model)?,
+    };
+    if arguments.learner.is_given() && !entry.learns() {
         return Err(Failure::Usage(format!(
-            "{} plans; --checkpoint, --curves and --learn are for learners, such as --with kafaq",
-            solver.name()
+            "{} plans; --checkpoint and --curves are for learners, such as --with kafaq",
+            entry.name()
         )));
     }
-    let scenario = scenario::find(&arguments.problem)?;
+    let (solver, runs) = arguments.told.solver(&registry, entry)?;
+    let solver = &solver;
+    if arguments.out.is_some() && !solver.makes_automaton(&scenario.model) {
+        return Err(Failure::Usage(format!(
+            "{} finds a free control for {}, which is no automaton and cannot be saved; leave out --out",
+            solver.name(),
+            scenario.model.name
+        )));
+    }
+    let request = Request {
+        form,
+        seed: arguments.evaluation.seed,
+        runs,
+        checkpoint: arguments.learner.checkpoint.clone(),
+    };
     arguments.check_files()?;
     arguments.evaluation.start_threads()?;
     let bars = Bars::new(arguments.json);
 
     let clock = Instant::now();
-    let solution = solve(solver, &scenario, &settings, &bars)?;
+    let solution = solve(solver, &scenario, &request, &bars)?;
     let solve_seconds = clock.elapsed().as_secs_f64();
     if let (Some(path), Some(automaton)) = (&arguments.out, solution.automaton()) {
         automaton.save(path)?;
@@ -265,7 +306,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
     let lost = arguments
         .value_lost
-        .then(|| value_lost(arguments, solver, &scenario, &settings, &solution, &bars))
+        .then(|| value_lost(arguments, solver, &scenario, &request, &solution, &bars))
         .transpose()?;
 
     let mut out = std::io::stdout().lock();
@@ -298,15 +339,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// Solves again without compiling, and compares.
 fn value_lost(
     arguments: &Arguments,
-    solver: SolverKind,
+    solver: &Solver,
     scenario: &Scenario,
-    settings: &SolveSettings,
+    request: &Request,
     solution: &Solution,
     bars: &Bars,
 ) -> Result<Estimate, Failure> {
-    let uncompiled = SolveSettings {
+    let uncompiled = Request {
         form: Form::Grid,
-        ..settings.clone()
+        ..request.clone()
     };
     let planner = solve(solver, scenario, &uncompiled, bars)?;
     let options = arguments.evaluation.options();
@@ -318,7 +359,7 @@ fn value_lost(
 fn report(
     arguments: &Arguments,
     scenario: &Scenario,
-    solver: SolverKind,
+    solver: &Solver,
     solution: &Solution,
     earned: &Earned,
     (solve, evaluate): (f64, f64),
@@ -346,7 +387,7 @@ fn report(
 fn shown(
     arguments: &Arguments,
     scenario: &Scenario,
-    solver: SolverKind,
+    solver: &Solver,
     solution: &Solution,
     earned: &Earned,
     (solve, evaluate): (f64, f64),
@@ -372,7 +413,7 @@ fn shown(
     if let (Some(learning), Some(samples)) = (&solution.learning, solution.samples) {
         lines.push(format!(
             "  learned in {samples} steps, with {}",
-            learning.describe()
+            learning.found
         ));
     }
     if !solution.converged {

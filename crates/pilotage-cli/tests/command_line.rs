@@ -40,15 +40,19 @@ fn json(arguments: &[&str]) -> String {
 #[test]
 fn a_seed_gives_the_same_bytes_with_one_thread_and_with_many() {
     for problem in ["corridor", "corridor-declare", "tiger"] {
-        for solver in ["kbvi-closed", "kbvi", "qmdp"] {
+        for (solver, settings) in [
+            ("value-iteration", "points=201"),
+            ("kbvi", "last_horizon=5"),
+            ("qmdp", "points=201"),
+        ] {
             let with = |threads: &str, seed: &str| {
                 json(&[
                     "solve",
                     problem,
                     "--with",
                     solver,
-                    "--last-horizon",
-                    "5",
+                    "--set",
+                    settings,
                     "--episodes",
                     "3000",
                     "--seed",
@@ -233,8 +237,8 @@ fn what_cannot_be_done_is_one_message() {
         (&["check", &at("bytes.toml")], "bytes.toml"),
         (&["solve", "coridor"], "did you mean `corridor`?"),
         (
-            &["solve", "corridor", "--with", "kbvi-close"],
-            "did you mean `kbvi-closed`?",
+            &["solve", "corridor", "--with", "value-iterat"],
+            "did you mean `value-iteration`?",
         ),
         (
             &["solve", "corridor", "--policy", "segment"],
@@ -252,6 +256,44 @@ fn what_cannot_be_done_is_one_message() {
             "cannot be saved",
         ),
         (&["solve", "corridor", "--episodes", "0"], "at least 1"),
+        (
+            &["solve", "corridor", "--with", "kafaq", "--grid", "41"],
+            "--grid is for --with value-iteration or --with qmdp or --with mls; kafaq has the settings `cell`",
+        ),
+        (
+            &["solve", "corridor", "--set", "lambda=0.5"],
+            "lambda is for --with kafaq or --with arkaq; value-iteration has the settings `memory`, `points`",
+        ),
+        (
+            &["solve", "corridor", "--set", "point=41"],
+            "did you mean `points`?",
+        ),
+        (
+            &[
+                "solve",
+                "corridor",
+                "--effort",
+                "nan",
+                "--with",
+                "policy-search",
+            ],
+            "effort=",
+        ),
+        (
+            &["solve", "scalar-lqg", "--out", &at("control.json")],
+            "lqg finds a free control for scalar-lqg",
+        ),
+        (
+            &[
+                "solve",
+                "scalar-lqg",
+                "--with",
+                "lqg",
+                "--checkpoint",
+                &at("c.json"),
+            ],
+            "--checkpoint and --curves are for learners",
+        ),
         (
             &["solve", "corridor", "--with", "lqg"],
             "lqg does not accept corridor",
@@ -290,7 +332,9 @@ fn what_cannot_be_done_is_one_message() {
         assert!(message.contains(says), "{arguments:?}: {message}");
         assert!(!message.contains("panicked"), "{message}");
     }
-    assert!(!Path::new(&at("p.json")).exists());
+    for file in ["p.json", "control.json", "c.json"] {
+        assert!(!Path::new(&at(file)).exists(), "{file}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use pilotage::solve::{SettingInfo, arkaq, kafaq};
+use pilotage::solve::{Registry, SettingInfo};
 use tempfile::TempDir;
 
 fn run(folder: &Path, arguments: &[&str]) -> Output {
@@ -59,21 +59,25 @@ fn folder_with(files: &[&str]) -> TempDir {
     folder
 }
 
-fn learners() -> [(&'static str, Vec<SettingInfo>); 2] {
-    [
-        ("kafaq", kafaq::Settings::described()),
-        ("arkaq", arkaq::Settings::described()),
-    ]
+/// Every solver with its settings, in the order in which they are listed.
+fn solvers() -> Vec<(&'static str, Vec<SettingInfo>)> {
+    let registry = Registry::builtin();
+    let entries = registry.entries().iter();
+    entries
+        .map(|entry| (entry.name(), entry.settings()))
+        .collect()
 }
 
 #[test]
-fn help_lists_the_settings_of_learners_with_default_and_range() {
+fn help_lists_the_settings_of_every_solver_with_default_and_range() {
     let here = std::env::temp_dir();
     assert!(printed(&here, &["--help"]).contains("pilotage solve --help"));
     let help = printed(&here, &["solve", "--help"]);
-    let (kafaq, arkaq) = between(&help, "Settings of kafaq", "Settings of arkaq");
-    for ((learner, settings), list) in learners().into_iter().zip([kafaq, arkaq]) {
-        assert!(settings.len() > 20, "{learner}");
+    let lists: Vec<&str> = help.split("\nSettings of ").skip(1).collect();
+    assert_eq!(lists.len(), solvers().len());
+    for ((solver, settings), list) in solvers().into_iter().zip(lists) {
+        assert!(list.starts_with(solver), "{list}");
+        assert!(settings.len() >= 2, "{solver}");
         for SettingInfo {
             name,
             default,
@@ -84,7 +88,7 @@ fn help_lists_the_settings_of_learners_with_default_and_range() {
                 let words: Vec<&str> = line.split_whitespace().collect();
                 words.len() > 2 && words[0] == name && words[1] == default
             });
-            assert!(listed, "{learner}: {name} = {default}\n{list}");
+            assert!(listed, "{solver}: {name} = {default}\n{list}");
             let range = [
                 "at least",
                 "at most",
@@ -95,7 +99,7 @@ fn help_lists_the_settings_of_learners_with_default_and_range() {
                 " or `",
             ];
             let ranged = range.iter().any(|words| about.contains(words));
-            assert!(ranged, "{learner}: {name} has no range: {about}");
+            assert!(ranged, "{solver}: {name} has no range: {about}");
         }
     }
 }
@@ -103,7 +107,10 @@ fn help_lists_the_settings_of_learners_with_default_and_range() {
 #[test]
 fn a_wrong_setting_lists_the_right_ones() {
     let here = std::env::temp_dir();
-    for (learner, settings) in learners() {
+    for (learner, settings) in solvers() {
+        if settings.iter().all(|info| info.name != "lambda") {
+            continue;
+        }
         for (wrong, meant) in [("lamda", Some("lambda")), ("zzzzzz", None), ("", None)] {
             let setting = format!("{wrong}=1");
             let said = refused(

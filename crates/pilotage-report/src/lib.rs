@@ -7,11 +7,11 @@
 //!
 //! ```
 //! use pilotage::{model, observe::Silent};
-//! use pilotage::solve::{SolveSettings, SolverKind, solve};
+//! use pilotage::solve::{Request, ValueIteration, plan};
 //! use pilotage_report::automaton_svg;
 //!
 //! let corridor = model::find("corridor-unbounded")?;
-//! let solution = solve(SolverKind::KbviClosed, &corridor, &SolveSettings::default(), &Silent)?;
+//! let solution = plan(&ValueIteration::default(), &corridor.model, &Request::default(), &Silent)?;
 //! let automaton = solution.automaton().expect("the default form is an automaton");
 //! assert!(automaton_svg(automaton)?.contains("EAST"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())

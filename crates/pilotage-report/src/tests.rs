@@ -10,26 +10,26 @@ use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Matching, Node, Place, Policy};
 use pilotage::scenario;
 use pilotage::solve::compile;
-use pilotage::solve::kbvi::closed;
+use pilotage::solve::value_iteration;
 
 fn mdp(name: &str) -> BeliefMdp {
     BeliefMdp::new(&scenario::find(name).expect("a built-in model").model)
 }
 
-fn solved(name: &str, matching: Matching) -> (BeliefMdp, closed::GridPolicy, Automaton) {
+fn solved(name: &str, matching: Matching) -> (BeliefMdp, value_iteration::GridPolicy, Automaton) {
     let mdp = mdp(name);
-    let settings = closed::Settings {
+    let settings = value_iteration::Settings {
         points: Some(301),
-        ..closed::Settings::default()
+        ..value_iteration::Settings::default()
     };
-    let policy = closed::solve(&mdp, &settings, &Silent).expect("settings in range");
+    let policy = value_iteration::solve(&mdp, &settings, &Silent).expect("settings in range");
     let settings = compile::Settings {
         matching,
         episodes: 200,
         ..compile::Settings::default()
     };
     let automaton =
-        compile::compile(&policy, &mdp, "kbvi-closed", &settings).expect("settings in range");
+        compile::compile(&policy, &mdp, "value-iteration", &settings).expect("settings in range");
     (mdp, policy, automaton)
 }
 

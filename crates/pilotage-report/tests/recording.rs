@@ -5,7 +5,8 @@ use pilotage::observe::Silent;
 use pilotage::policy::Controller;
 use pilotage::scenario::{self, Scenario, Truth};
 use pilotage::simulate::{Agent, FilterAgent, run_episode, wake_up};
-use pilotage::solve::{SolveSettings, SolverKind, solve};
+use pilotage::solve::value_iteration::Settings;
+use pilotage::solve::{Request, ValueIteration, plan};
 use pilotage::world::{Draws, ProblemWorld};
 use pilotage_report::{Recording, Take, record};
 
@@ -46,11 +47,13 @@ fn recordings_are_the_runs_of_a_simulation() {
     for name in ["corridor", "load-unload", "u-maze"] {
         let scenario = scenario::find(name).expect("a built-in model");
         let mdp = BeliefMdp::new(&scenario.model);
-        let settings = SolveSettings {
-            points: Some(41),
-            ..SolveSettings::default()
+        let planner = ValueIteration {
+            grid: Settings {
+                points: Some(41),
+                ..Settings::default()
+            },
         };
-        let solution = solve(SolverKind::KbviClosed, &scenario, &settings, &Silent)
+        let solution = plan(&planner, &scenario.model, &Request::default(), &Silent)
             .expect("a model it accepts");
         let automaton = solution.automaton().expect("the default form");
         let controller = Controller::new(automaton);

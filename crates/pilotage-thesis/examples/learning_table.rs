@@ -15,8 +15,8 @@ use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options, evaluate};
-use pilotage::solve::kbvi::closed;
-use pilotage::solve::{Form, SolveSettings, SolverKind, arkaq, kafaq, solve};
+use pilotage::solve::value_iteration;
+use pilotage::solve::{Form, Request, ValueIteration, arkaq, kafaq, plan};
 use pilotage::world::{ProblemWorld, World};
 use pilotage_thesis::baseline::{baselines, told};
 use rayon::prelude::*;
@@ -347,14 +347,11 @@ fn baseline(scenario: &Scenario) -> (String, Evaluation, Option<usize>) {
         };
         return ("never out of equilibrium".to_owned(), upright, None);
     }
-    let settings = SolveSettings {
-        form: Form::Segments,
-        ..SolveSettings::default()
-    };
     let told = told(scenario);
-    let plan = solve(SolverKind::KbviClosed, &told, &settings, &Silent).unwrap();
+    let request = Request::form(Form::Segments);
+    let plan = plan(&ValueIteration::default(), &told.model, &request, &Silent).unwrap();
     let nodes = plan.automaton().map(|automaton| automaton.nodes.len());
-    let planner = closed::Settings::default();
+    let planner = value_iteration::Settings::default();
     let first = baselines(scenario, &planner, EVALUATION, &Silent)
         .unwrap()
         .swap_remove(0);

@@ -17,7 +17,7 @@ use pilotage::policy::{Controller, Policy};
 use pilotage::scenario::find;
 use pilotage::simulate::{LifeOptions, life};
 use pilotage::solve::kbvi::branches::{self, Branches};
-use pilotage::solve::kbvi::quadratic;
+use pilotage::solve::{PolicySearch, policy_search};
 use pilotage_thesis::regulator::tuned;
 
 struct Notes;
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mdp = BeliefMdp::new(&scenario.model);
 
     let clock = Instant::now();
-    let automaton = quadratic::solve(&mdp, &quadratic::Settings::default(), &Notes)?;
+    let automaton = policy_search::search(&mdp, &PolicySearch::default(), 1, &Notes)?;
     let planning = clock.elapsed().as_secs_f64();
     let (lqg, [position, angle, control]) = tuned(&mdp, 1.0)?;
 
@@ -74,7 +74,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let nodes = automaton.nodes.len().to_string();
     row(
-        "kbvi-closed, automaton",
+        "policy-search, automaton",
         nodes,
         &Controller::new(&automaton),
         options,

@@ -5,7 +5,7 @@ use pilotage::observe::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options};
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
-use pilotage::solve::{Form, SolveSettings, SolverKind, solve};
+use pilotage::solve::{Form, Kbvi, Registry, Request, Solver, solve};
 
 const SEED: u64 = 1;
 const EPISODES: usize = 100_000;
@@ -35,16 +35,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "| solver | formulas | policy | nodes | horizon | planned | discounted | undiscounted | steps |"
         );
         println!("|---|---|---|--:|--:|--:|--:|--:|--:|");
-        for solver in SolverKind::ALL
-            .into_iter()
-            .filter(|solver| !solver.learns())
-        {
-            for (label, formulas) in formula_sets(solver) {
-                for form in Form::ALL {
-                    let Some(evaluation) = row(&scenario, solver, label, formulas, form)? else {
-                        continue;
-                    };
-                    earned.push(((name, solver, label, form), evaluation));
+        for (label, solver) in planners()? {
+            for form in Form::ALL {
+                if let Some(evaluation) = row(&scenario, &solver, label, form)? {
+                    earned.push(((name, solver.name(), label, form), evaluation));
                 }
             }
         }
@@ -53,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-type Row = ((&'static str, SolverKind, &'static str, Form), Evaluation);
+type Row = ((&'static str, &'static str, &'static str, Form), Evaluation);
 
 /// The thesis' comparison of its two policy forms, and what they earn here. It does not say what its numbers are of.
 fn beside_table_6_1(earned: &[Row]) {
@@ -107,7 +101,7 @@ fn beside_table_6_1(earned: &[Row]) {
         for (name, reading) in readings {
             for ((_, _, label, _), evaluation) in
                 earned.iter().filter(|((model, solver, _, of), _)| {
-                    *model == name && *solver == SolverKind::Kbvi && *of == form
+                    *model == name && *solver == "kbvi" && *of == form
                 })
             {
                 println!(
@@ -130,8 +124,8 @@ fn beside_table_6_1(earned: &[Row]) {
     );
 }
 
-/// Only the thesis' branches have formulas to choose from.
-fn formula_sets(solver: SolverKind) -> Vec<(&'static str, Formulas)> {
+/// The planners, with the formulas of the thesis' branches, of which alone there are some to choose from.
+fn planners() -> pilotage::Result<Vec<(&'static str, Solver)>> {
     let ramp = Formulas {
         reward: RewardFormula::Ramp,
         ..Formulas::default()
@@ -144,35 +138,44 @@ fn formula_sets(solver: SolverKind) -> Vec<(&'static str, Formulas)> {
         integral: IntegralFormula::Printed,
         ..printed
     };
-    match solver {
-        SolverKind::Kbvi => vec![
-            ("exact", Formulas::default()),
-            ("ramp", ramp),
-            ("ramp, printed 5.6", printed),
-            ("ramp, printed 5.6 and 5.14", all_printed),
-        ],
-        _ => vec![("", Formulas::default())],
+    let formulas = [
+        ("exact", Formulas::default()),
+        ("ramp", ramp),
+        ("ramp, printed 5.6", printed),
+        ("ramp, printed 5.6 and 5.14", all_printed),
+    ];
+    let mut planners = Vec::new();
+    for entry in Registry::builtin().entries() {
+        if entry.name() == "kbvi" {
+            planners.extend(formulas.map(|(label, formulas)| {
+                let branches = Kbvi {
+                    formulas,
+                    ..Kbvi::default()
+                };
+                (label, Solver::planner(branches))
+            }));
+        } else if !entry.learns() {
+            planners.push(("", entry.solver(&[])?));
+        }
     }
+    Ok(planners)
 }
 
 fn row(
     scenario: &Scenario,
-    solver: SolverKind,
+    solver: &Solver,
     label: &str,
-    formulas: Formulas,
     form: Form,
 ) -> Result<Option<Evaluation>, Box<dyn std::error::Error>> {
-    let slow = solver == SolverKind::Kbvi && form == Form::Grid;
+    let slow = solver.name() == "kbvi" && form == Form::Grid;
     if slow || solver.accepts(&scenario.model).is_err() {
         return Ok(None);
     }
-    let settings = SolveSettings {
-        form,
+    let request = Request {
         seed: SEED,
-        formulas,
-        ..SolveSettings::default()
+        ..Request::form(form)
     };
-    let solution = solve(solver, scenario, &settings, &Silent)?;
+    let solution = solve(solver, scenario, &request, &Silent)?;
     let episodes = if form == Form::Grid { 2_000 } else { EPISODES };
     let options = Options {
         episodes,

@@ -10,7 +10,7 @@ use pilotage::observe::Observer;
 use pilotage::policy::Policy;
 use pilotage::scenario::Scenario;
 use pilotage::simulate::{Agent, Estimate, Evaluation, Options, evaluate, run_episode};
-use pilotage::solve::kbvi::closed;
+use pilotage::solve::value_iteration;
 use pilotage::world::{Draws, ProblemWorld};
 
 /// What somebody earns who knows more than the learner, or does less.
@@ -29,16 +29,17 @@ pub struct Baseline {
 /// is compared with who knows the mode's controls as actions of their own.
 ///
 /// # Errors
-/// As [`closed::solve`].
+/// As [`value_iteration::solve`].
 pub fn baselines(
     scenario: &Scenario,
-    planner: &closed::Settings,
+    planner: &value_iteration::Settings,
     options: Options,
     observer: &dyn Observer,
 ) -> Result<Vec<Baseline>> {
     let told = told(scenario);
-    let plan = |told: &Scenario| closed::solve(&BeliefMdp::new(&told.model), planner, observer);
-    let earned = |world: &Scenario, policy: &closed::GridPolicy| {
+    let plan =
+        |told: &Scenario| value_iteration::solve(&BeliefMdp::new(&told.model), planner, observer);
+    let earned = |world: &Scenario, policy: &value_iteration::GridPolicy| {
         evaluate(world, &policy.mdp().filter(), policy, options, observer)
     };
     let mut found = Vec::new();

@@ -7,7 +7,7 @@ use pilotage::policy::Controller;
 use pilotage::scenario::{Scenario, Simulator};
 use pilotage::simulate::{Evaluation, LifeOptions, life};
 use pilotage::solve::arkaq::{self, Learned};
-use pilotage::solve::{Learning, compile};
+use pilotage::solve::compile;
 use pilotage::world::{ProblemWorld, World};
 use pilotage_report::{Finding, Series, Verdict, returns_svg, values_svg};
 use rayon::prelude::*;
@@ -226,8 +226,8 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding> {
         nodes.push((vigilance, of_nodes));
         earnings.push((vigilance, share));
         if let (true, Some(first)) = (vigilance == one.vigilances[0], found.first()) {
-            let learning = Learning::Arkaq(first.learned.learning.clone());
             let automaton = &first.learned.automaton;
+            let learning = arkaq::drawn(automaton, &first.learned.learning);
             draft = draft
                 .automaton(
                     format!("States identified at vigilance {vigilance}"),

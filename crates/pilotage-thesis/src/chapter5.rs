@@ -13,7 +13,8 @@ use pilotage::solve::kbvi::formulas::{
     Formulas, Outlook, RewardFormula, SpreadFormula, ramp_lines,
 };
 use pilotage::solve::kbvi::generate;
-use pilotage::solve::{Form, SolveSettings, SolverKind};
+use pilotage::solve::value_iteration;
+use pilotage::solve::{Form, Kbvi, Mls, Planner, Qmdp, Request, ValueIteration};
 use pilotage_report::{Finding, Series, Verdict};
 
 use crate::context::{Context, Draft, automaton, judge, or_dash, problem, shown};
@@ -222,16 +223,16 @@ fn thesis_style(
     form: Form,
     reward: RewardFormula,
 ) -> Result<(Row, pilotage::policy::Automaton)> {
-    let settings = SolveSettings {
-        form,
+    let planner = Kbvi {
         formulas: Formulas {
             reward,
             ..Formulas::default()
         },
-        horizons: 3..=context.either(20, 13),
-        ..SolveSettings::default()
+        first_horizon: 3,
+        last_horizon: context.either(20, 13),
+        ..Kbvi::default()
     };
-    let solution = context.solved(SolverKind::Kbvi, scenario, settings)?;
+    let solution = context.solved(&planner, scenario, Request::form(form))?;
     let found = automaton(&solution)?.clone();
     let row = Row {
         nodes: found.nodes.len(),
@@ -289,7 +290,7 @@ pub fn figures_5_9_and_5_10(context: &Context<'_>) -> Result<Finding> {
         let found = automaton(&planned)?;
         rows.push([
             reading.to_owned(),
-            "kbvi-closed".to_owned(),
+            "value-iteration".to_owned(),
             "nearest".to_owned(),
             found.nodes.len().to_string(),
             "–".to_owned(),
@@ -359,7 +360,7 @@ pub fn figures_5_11_to_5_13(context: &Context<'_>) -> Result<Finding> {
         let found = automaton(&planned)?;
         rows.push([
             name.to_owned(),
-            "kbvi-closed".to_owned(),
+            "value-iteration".to_owned(),
             "nearest".to_owned(),
             found.nodes.len().to_string(),
             "–".to_owned(),
@@ -402,12 +403,16 @@ pub fn figures_5_11_to_5_13(context: &Context<'_>) -> Result<Finding> {
 pub fn section_5_5_3(context: &Context<'_>) -> Result<Finding> {
     let scenario = problem("maze-2d-unbounded")?;
     let solution = context.solved(
-        SolverKind::KbviClosed,
+        &ValueIteration {
+            grid: value_iteration::Settings {
+                points: context.quick.then_some(41),
+                ..Default::default()
+            },
+        },
         &scenario,
-        SolveSettings {
-            points: context.quick.then_some(41),
-            runs: context.quick.then_some(40),
-            ..SolveSettings::default()
+        Request {
+            runs: context.either(Request::default().runs, 40),
+            ..Request::default()
         },
     )?;
     let found = automaton(&solution)?;
@@ -538,17 +543,19 @@ pub fn declare(context: &Context<'_>) -> Result<Finding> {
     let scenario = problem("corridor-declare")?;
     let mut rows = Vec::new();
     let mut earned = Vec::new();
-    for solver in [
-        SolverKind::KbviClosed,
-        SolverKind::Kbvi,
-        SolverKind::Mls,
-        SolverKind::Qmdp,
-    ] {
-        let settings = SolveSettings {
-            horizons: 3..=context.either(20, 12),
-            ..SolveSettings::default()
-        };
-        let solution = context.solved(solver, &scenario, settings)?;
+    let branches = Kbvi {
+        first_horizon: 3,
+        last_horizon: context.either(20, 12),
+        ..Kbvi::default()
+    };
+    let planners: [&dyn Planner; 4] = [
+        &ValueIteration::default(),
+        &branches,
+        &Mls::default(),
+        &Qmdp::default(),
+    ];
+    for solver in planners {
+        let solution = context.solved(solver, &scenario, Request::default())?;
         let found = context.earned(&scenario, &solution)?;
         rows.push([
             solver.name().to_owned(),

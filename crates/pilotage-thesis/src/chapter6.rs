@@ -1,7 +1,7 @@
 //! Chapter 6: the comparison of algorithms.
 
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
-use pilotage::solve::{Form, SolveSettings, SolverKind};
+use pilotage::solve::{Form, Kbvi, Request};
 use pilotage_report::{Finding, Verdict};
 
 use crate::context::{Context, Draft, judge, problem, shown};
@@ -46,13 +46,13 @@ pub fn table_6_1(context: &Context<'_>) -> Result<Finding> {
                 ("ramp", ramp),
                 ("printed", printed),
             ] {
-                let settings = SolveSettings {
-                    form,
+                let planner = Kbvi {
                     formulas,
-                    horizons: 3..=context.either(20, 10),
-                    ..SolveSettings::default()
+                    first_horizon: 3,
+                    last_horizon: context.either(20, 10),
+                    ..Kbvi::default()
                 };
-                let solution = context.solved(SolverKind::Kbvi, &scenario, settings)?;
+                let solution = context.solved(&planner, &scenario, Request::form(form))?;
                 let earned = context.earned(&scenario, &solution)?;
                 if name == "tiger" && label == "corrected" {
                     let undiscounted = earned.undiscounted.mean;

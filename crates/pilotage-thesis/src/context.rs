@@ -6,7 +6,7 @@ use pilotage::observe::Observer;
 use pilotage::policy::Automaton;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options};
-use pilotage::solve::{Solution, SolveSettings, SolverKind, solve};
+use pilotage::solve::{Planner, Request, Solution, ValueIteration, plan};
 use pilotage_report::{
     Figure, Finding, Series, Table, Verdict, automaton_svg, belief_map_svg, curves_svg,
 };
@@ -38,20 +38,20 @@ impl Context<'_> {
 
     pub(crate) fn solved(
         &self,
-        solver: SolverKind,
+        planner: &dyn Planner,
         scenario: &Scenario,
-        settings: SolveSettings,
+        request: Request,
     ) -> Result<Solution> {
-        let settings = SolveSettings {
+        let request = Request {
             seed: self.seed,
-            ..settings
+            ..request
         };
-        Ok(solve(solver, scenario, &settings, self.observer)?)
+        Ok(plan(planner, &scenario.model, &request, self.observer)?)
     }
 
     /// The default planner's automaton, which is the baseline.
     pub(crate) fn planned(&self, scenario: &Scenario) -> Result<Solution> {
-        self.solved(SolverKind::KbviClosed, scenario, SolveSettings::default())
+        self.solved(&ValueIteration::default(), scenario, Request::default())
     }
 
     pub(crate) fn earned(&self, scenario: &Scenario, solution: &Solution) -> Result<Evaluation> {

@@ -4,7 +4,7 @@ use pilotage::belief::BeliefMdp;
 use pilotage::observe::Observer;
 use pilotage::policy::{Automaton, Matching};
 use pilotage::scenario;
-use pilotage::solve::{SolveSettings, SolverKind, solve};
+use pilotage::solve::{Request, ValueIteration, plan};
 use pilotage_report::{Recording, Take, record};
 
 use crate::error::Result;
@@ -37,10 +37,10 @@ pub fn episodes(seed: u64, observer: &dyn Observer) -> Result<Vec<Recording>> {
     ];
     let recordings = shown.map(|(name, most_steps, title, about)| {
         let scenario = scenario::find(name)?;
-        let solution = solve(
-            SolverKind::KbviClosed,
-            &scenario,
-            &SolveSettings::default(),
+        let solution = plan(
+            &ValueIteration::default(),
+            &scenario.model,
+            &Request::default(),
             observer,
         )?;
         let mdp = BeliefMdp::new(&scenario.model);

@@ -5,9 +5,9 @@ use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller};
 use pilotage::scenario::Scenario;
 use pilotage::simulate::{Evaluation, LifeOptions, Options, evaluate, life};
+use pilotage::solve::compile;
 use pilotage::solve::kafaq::{self, Learned};
-use pilotage::solve::kbvi::closed;
-use pilotage::solve::{Learning, compile};
+use pilotage::solve::value_iteration;
 use pilotage::world::{ProblemWorld, World};
 use pilotage_report::{Finding, Verdict, returns_svg, values_svg};
 use rayon::prelude::*;
@@ -110,10 +110,10 @@ pub fn runs(context: &Context<'_>, scenario: &Scenario) -> Result<Vec<Run>> {
 
 /// The planner that is the baseline. For a quick look its grid of the plane is coarser: the policy is hardly worse, and it takes a
 /// tenth of the time.
-fn planner(context: &Context<'_>, scenario: &Scenario) -> closed::Settings {
-    closed::Settings {
+fn planner(context: &Context<'_>, scenario: &Scenario) -> value_iteration::Settings {
+    value_iteration::Settings {
         points: (context.quick && scenario.model.state_dim() == 2).then_some(25),
-        ..closed::Settings::default()
+        ..value_iteration::Settings::default()
     }
 }
 
@@ -182,7 +182,7 @@ fn reproduced(context: &Context<'_>, problem_: &Problem) -> Result<Finding> {
         );
     if let Some(first) = runs.first() {
         let automaton = &first.learned.automaton;
-        let learning = &Learning::Kafaq(first.learned.learning.clone());
+        let learning = &kafaq::drawn(automaton, &first.learned.learning);
         draft = draft
             .automaton(format!("The automaton of seed {}", context.seed), automaton)?
             .figure("Q-values while learning", values_svg(automaton, learning)?)
@@ -333,7 +333,10 @@ pub fn section_4_3_6(context: &Context<'_>) -> Result<Finding> {
     if let Some((first, _)) = lives.first() {
         draft = draft.figure(
             format!("Reward a step while seed {} learned", context.seed),
-            returns_svg(&first.automaton, &Learning::Kafaq(first.learning.clone()))?,
+            returns_svg(
+                &first.automaton,
+                &kafaq::drawn(&first.automaton, &first.learning),
+            )?,
         );
     }
     Ok(draft.verdict(judge(

@@ -4,7 +4,7 @@ use pilotage::belief::BeliefMdp;
 use pilotage::policy::{Controller, Policy};
 use pilotage::simulate::{LifeOptions, life};
 use pilotage::solve::kbvi::branches::{self, Branches};
-use pilotage::solve::kbvi::quadratic;
+use pilotage::solve::{PolicySearch, policy_search};
 use pilotage_report::{Finding, Verdict};
 
 use crate::context::{Context, Draft, judge, problem};
@@ -24,12 +24,11 @@ pub fn section_5_5_5(context: &Context<'_>) -> Result<Finding> {
     for &name in models {
         let scenario = problem(name)?;
         let mdp = BeliefMdp::new(&scenario.model);
-        let settings = quadratic::Settings {
+        let settings = PolicySearch {
             effort: context.either(1.0, 0.1),
-            seed: context.seed,
-            ..quadratic::Settings::default()
+            ..PolicySearch::default()
         };
-        let found = quadratic::solve(&mdp, &settings, context.observer)?;
+        let found = policy_search::search(&mdp, &settings, context.seed, context.observer)?;
         let filter = found.filter.clone();
         let (regulator, _) = tuned(&mdp, context.either(1.0, 0.02))?;
         let open_loop = |horizon, group| {
@@ -42,7 +41,7 @@ pub fn section_5_5_5(context: &Context<'_>) -> Result<Finding> {
         };
         let (planned, long, short) = (Controller::new(&found), open_loop(180, 20), open_loop(6, 1));
         let policies: [(&str, &dyn Policy, u64); 4] = [
-            ("kbvi-closed, automaton", &planned, steps),
+            ("policy-search, automaton", &planned, steps),
             ("lqg, bang-bang, its weights tuned", &regulator, steps),
             (
                 "kbvi, open loop, horizon 180 by twenties",
@@ -58,7 +57,7 @@ pub fn section_5_5_5(context: &Context<'_>) -> Result<Finding> {
                 seed: context.seed,
             };
             let lived = life(&scenario, &filter, policy, options, context.observer);
-            if name == "cart-pole" && label.starts_with("kbvi-closed") {
+            if name == "cart-pole" && label.starts_with("policy-search") {
                 held = lived.failures() == 0;
             }
             let mean = lived.mean().map_or_else(

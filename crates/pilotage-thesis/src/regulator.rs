@@ -4,8 +4,8 @@ use pilotage::belief::BeliefMdp;
 use pilotage::error::{Error, Result};
 use pilotage::model::Model;
 use pilotage::policy::Controller;
-use pilotage::solve::hazard::{Runs, Sample};
 use pilotage::solve::lqg::{NearestAction, Weights};
+use pilotage::solve::policy_search::failure::{Runs, Sample};
 
 /// Weights of position, angle and force.
 pub type PoleWeights = [f64; 3];

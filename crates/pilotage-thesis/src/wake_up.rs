@@ -3,7 +3,7 @@
 use pilotage::belief::{Belief, BeliefMdp, Merge, Tracking};
 use pilotage::policy::Policy;
 use pilotage::simulate::wake_up::{Choice, Settings as Kidnapping, measure};
-use pilotage::solve::kbvi::closed;
+use pilotage::solve::value_iteration;
 use pilotage_report::{Finding, Verdict, belief_map_svg};
 
 use crate::context::{Context, Draft, judge, problem, shown};
@@ -27,7 +27,11 @@ const TABLE_5_1: [(usize, &str, [f64; 2], &str); 10] = [
 pub fn table_5_1(context: &Context<'_>) -> Result<Finding> {
     let model = problem("u-maze")?.model;
     let mdp = BeliefMdp::new(&model);
-    let policy = closed::solve(&mdp, &closed::Settings::default(), context.observer)?;
+    let policy = value_iteration::solve(
+        &mdp,
+        &value_iteration::Settings::default(),
+        context.observer,
+    )?;
     let mut same = 0;
     let rows = TABLE_5_1
         .iter()
@@ -71,7 +75,11 @@ pub fn figures_5_16_and_5_17(context: &Context<'_>) -> Result<Finding> {
     for name in ["n-maze", "u-maze"] {
         let scenario = problem(name)?;
         let mdp = BeliefMdp::new(&scenario.model);
-        let policy = closed::solve(&mdp, &closed::Settings::default(), context.observer)?;
+        let policy = value_iteration::solve(
+            &mdp,
+            &value_iteration::Settings::default(),
+            context.observer,
+        )?;
         draft = draft.figure(
             format!("{name}: what to do at which mean"),
             belief_map_svg(&mdp, &policy, None)?,

@@ -6,7 +6,7 @@ use pilotage::policy::Controller;
 use pilotage::scenario;
 use pilotage::simulate::{Options, evaluate};
 use pilotage::solve::arkaq::{self, Learned, Settings};
-use pilotage::solve::kbvi::closed;
+use pilotage::solve::value_iteration;
 use pilotage::world::{ProblemWorld, World};
 use pilotage_thesis::baseline::baselines;
 
@@ -25,7 +25,7 @@ fn a_longer_memory_finds_which_way_the_shuttle_faces_and_merges_into_a_handful_o
         merge: true,
         ..short.clone()
     };
-    let told = closed::Settings::default();
+    let told = value_iteration::Settings::default();
     let options = |episodes| Options { episodes, seed: 77 };
     let best = baselines(&scenario, &told, options(2_000), &Silent).unwrap()[0].earned;
     let share = |learned: &Learned| {

@@ -8,7 +8,7 @@ use pilotage::policy::{Automaton, Controller, Policy};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::compile::{self, compile};
-use pilotage::solve::kbvi::closed;
+use pilotage::solve::value_iteration;
 
 fn main() {
     divan::main();
@@ -61,13 +61,13 @@ fn episodes_of_the_grid(bencher: Bencher) {
         .bench(|| simulate(&corridor, &policy));
 }
 
-fn plan(mdp: &BeliefMdp) -> closed::GridPolicy {
-    closed::solve(mdp, &closed::Settings::default(), &Silent).unwrap()
+fn plan(mdp: &BeliefMdp) -> value_iteration::GridPolicy {
+    value_iteration::solve(mdp, &value_iteration::Settings::default(), &Silent).unwrap()
 }
 
-fn compiled(policy: &closed::GridPolicy) -> Automaton {
+fn compiled(policy: &value_iteration::GridPolicy) -> Automaton {
     let settings = compile::Settings::default();
-    compile(policy, policy.mdp(), "kbvi-closed", &settings).unwrap()
+    compile(policy, policy.mdp(), "value-iteration", &settings).unwrap()
 }
 
 fn simulate(scenario: &Scenario, policy: &dyn Policy) -> Evaluation {

@@ -10,7 +10,7 @@ use pilotage::policy::{Automaton, Controller, Matching, Node, Place};
 use pilotage::scenario;
 use pilotage::simulate::{Agent, FilterAgent};
 use pilotage::solve::compile::{self, compile};
-use pilotage::solve::kbvi::closed;
+use pilotage::solve::value_iteration;
 
 fn main() {
     divan::main();
@@ -37,7 +37,7 @@ fn corridor_automaton(bencher: Bencher, matching: &Matching) {
         matching: *matching,
         ..compile::Settings::default()
     };
-    let automaton = compile(&policy, policy.mdp(), "kbvi-closed", &settings).unwrap();
+    let automaton = compile(&policy, policy.mdp(), "value-iteration", &settings).unwrap();
     run(bencher, &automaton);
 }
 
@@ -67,9 +67,9 @@ fn four_dimensions_few_nodes(bencher: Bencher, nodes: usize) {
     run(bencher, &synthetic(nodes, Matching::Nearest));
 }
 
-fn corridor() -> closed::GridPolicy {
+fn corridor() -> value_iteration::GridPolicy {
     let mdp = BeliefMdp::new(&scenario::find("corridor").unwrap().model);
-    closed::solve(&mdp, &closed::Settings::default(), &Silent).unwrap()
+    value_iteration::solve(&mdp, &value_iteration::Settings::default(), &Silent).unwrap()
 }
 
 fn synthetic(nodes: usize, matching: Matching) -> Automaton {

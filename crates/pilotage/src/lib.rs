@@ -15,11 +15,11 @@
 //!
 //! ```
 //! use pilotage::{observe::Silent, scenario, simulate::Options};
-//! use pilotage::solve::{SolveSettings, SolverKind, solve};
+//! use pilotage::solve::{Request, ValueIteration, plan};
 //!
 //! // A robot in a corridor of four cells, paid in the last one.
 //! let corridor = scenario::find("corridor-unbounded")?;
-//! let solution = solve(SolverKind::KbviClosed, &corridor, &SolveSettings::default(), &Silent)?;
+//! let solution = plan(&ValueIteration::default(), &corridor.model, &Request::default(), &Silent)?;
 //!
 //! // Go EAST below 3, STOP up to 4, WEST above.
 //! let automaton = solution.automaton().expect("the default form is an automaton");

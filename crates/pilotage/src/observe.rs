@@ -1,6 +1,8 @@
 //! The one hook by which algorithms report what they do. Algorithms hold mathematics only; progress bars, logs and
 //! plots hang here.
 
+use std::ops::ControlFlow;
+
 /// Watches an algorithm at work. Every method has a default that does nothing.
 pub trait Observer: Sync {
     /// A stage of the work has come so far; with nothing done it begins. `total` is 0 where it is not known. Reports of several
@@ -17,6 +19,11 @@ pub trait Observer: Sync {
     /// Something worth a sentence happened.
     fn note(&self, message: &str) {
         let _ = message;
+    }
+
+    /// Asked by learners between two pieces of work: whether to go on, or to hand over what was learned so far.
+    fn goes_on(&self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
     }
 }
 

@@ -10,8 +10,9 @@ use pilotage::observe::{Observer, Silent};
 use pilotage::policy::{Automaton, Controller, Node, Place};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Evaluation, Options, evaluate};
-use pilotage::solve::arkaq::{self, Learned, Run, Settings};
-use pilotage::solve::kbvi::closed;
+use pilotage::solve::Run;
+use pilotage::solve::arkaq::{self, Learned, Settings};
+use pilotage::solve::value_iteration;
 use pilotage::world::{ProblemWorld, World};
 
 const OPTIONS: Options = Options {
@@ -66,7 +67,8 @@ fn earned(scenario: &Scenario, automaton: &Automaton) -> Evaluation {
 
 fn planned(scenario: &Scenario) -> Evaluation {
     let mdp = BeliefMdp::new(&scenario.model);
-    let plan = closed::solve(&mdp, &closed::Settings::default(), &Silent).unwrap();
+    let plan =
+        value_iteration::solve(&mdp, &value_iteration::Settings::default(), &Silent).unwrap();
     evaluate(scenario, &plan.mdp().filter(), &plan, OPTIONS, &Silent)
 }
 
@@ -243,16 +245,16 @@ fn a_run_is_its_seed_and_a_resumed_one_ends_like_one_never_stopped() {
     );
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("checkpoint");
-    let mut run = Run::new(&scenario.model, &worlds, &hurried()).unwrap();
-    while !run.finished() {
-        run.advance(&Silent).unwrap();
+    let course = |settings: &Settings| arkaq::course(&scenario.model, &worlds, settings).unwrap();
+    let mut run = Run::new(course(&hurried())).unwrap();
+    while run.step(&Silent).unwrap().is_continue() {
         run.save(&path).unwrap();
-        run = Run::resume(&scenario.model, &worlds, &hurried(), &path).unwrap();
+        run = Run::resume(course(&hurried()), &path).unwrap();
     }
     assert_eq!(run.learned(), whole);
     // Another's checkpoint is refused.
     assert!(matches!(
-        Run::resume(&scenario.model, &worlds, &other, &path).map(|_| ()),
+        Run::resume(course(&other), &path).map(|_| ()),
         Err(Error::Checkpoint { .. })
     ));
 }

@@ -1,10 +1,13 @@
 //! What is true reaches no planner: whatever a model file says of the world, plan and automaton are the same to the last byte.
 #![allow(clippy::unwrap_used)]
 
+mod common;
+
+use common::{short, small};
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::observe::Silent;
 use pilotage::scenario::{self, Scenario, Truth};
-use pilotage::solve::{Form, Solution, SolveSettings, Solved, SolverKind, solve};
+use pilotage::solve::{Form, Registry, Solution, Solved, solve};
 
 /// A model, and what `[world]` may say beside it.
 struct Case {
@@ -103,21 +106,6 @@ impl Case {
     }
 }
 
-fn settings(scenario: &Scenario, form: Form) -> SolveSettings {
-    SolveSettings {
-        form,
-        points: Some(match scenario.model.state_dim() {
-            1 => 161,
-            2 => 25,
-            _ => 3,
-        }),
-        horizons: 1..=2,
-        runs: Some(20),
-        effort: 1e-3,
-        ..SolveSettings::default()
-    }
-}
-
 /// All that was planned, as text: the automaton's file, or what a rule does and expects all over the bounds.
 fn text_of(scenario: &Scenario, solution: &Solution) -> String {
     let plan = match &solution.policy {
@@ -161,12 +149,13 @@ fn no_world_changes_a_plan_or_its_automaton() {
                 case.model
             );
         }
-        let planners = SolverKind::ALL.into_iter().filter(|kind| !kind.learns());
-        for kind in planners.filter(|kind| kind.accepts(&base.model).is_ok()) {
+        let registry = Registry::builtin();
+        let planners = registry.entries().iter().filter(|entry| !entry.learns());
+        for planner in planners.filter(|entry| entry.accepts(&base.model).is_ok()) {
+            let solver = small(planner, &base.model);
             for form in Form::ALL {
                 let planned = |scenario: &Scenario| {
-                    let settings = settings(scenario, form);
-                    let solution = solve(kind, scenario, &settings, &Silent).unwrap();
+                    let solution = solve(&solver, scenario, &short(form), &Silent).unwrap();
                     text_of(scenario, &solution)
                 };
                 let expected = planned(&base);
@@ -175,7 +164,7 @@ fn no_world_changes_a_plan_or_its_automaton() {
                         planned(other) == expected,
                         "{} with {} as {} is planned otherwise beside\n{world}",
                         case.model,
-                        kind.name(),
+                        planner.name(),
                         form.name()
                     );
                 }

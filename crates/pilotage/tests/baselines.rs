@@ -13,18 +13,15 @@ use pilotage::simulate::{Estimate, Evaluation, Options};
 use pilotage::solve::lqg::{Controller, NearestAction, Weights};
 use pilotage::solve::lqr::lqr_gain;
 use pilotage::solve::mdp::{self, StateMdp};
-use pilotage::solve::{Form, Solution, SolveSettings, SolverKind, solve};
+use pilotage::solve::{Form, Lqg, Mls, Planner, Qmdp, Request, Solution, plan};
 
 fn scenario(name: &str) -> Scenario {
     scenario::find(name).unwrap()
 }
 
-fn solved(kind: SolverKind, scenario: &Scenario) -> Solution {
-    let settings = SolveSettings {
-        form: Form::Grid,
-        ..Default::default()
-    };
-    solve(kind, scenario, &settings, &Silent).unwrap()
+fn solved(planner: &dyn Planner, scenario: &Scenario) -> Solution {
+    let request = Request::form(Form::Grid);
+    plan(planner, &scenario.model, &request, &Silent).unwrap()
 }
 
 fn earned(solution: &Solution, scenario: &Scenario, episodes: usize) -> Evaluation {
@@ -43,7 +40,7 @@ fn assert_near(estimate: Estimate, expected: f64) {
 #[test]
 fn the_scalar_problem_costs_what_its_closed_form_says() {
     let scenario = scenario("scalar-lqg");
-    let solution = solved(SolverKind::Lqg, &scenario);
+    let solution = solved(&Lqg::default(), &scenario);
     assert!((solution.planned_value.unwrap() + 32.50117).abs() < 5e-6);
     assert_near(earned(&solution, &scenario, 20_000).discounted, -32.50117);
 }
@@ -76,7 +73,7 @@ fn turning() -> Model {
 #[test]
 fn the_closed_form_holds_in_two_variables_with_discount() {
     let scenario = Scenario::assumed(&turning());
-    let solution = solved(SolverKind::Lqg, &scenario);
+    let solution = solved(&Lqg::default(), &scenario);
     let evaluation = earned(&solution, &scenario, 20_000);
     assert_near(evaluation.discounted, solution.planned_value.unwrap());
     assert!(evaluation.discounted.stderr < 0.01 * evaluation.discounted.mean.abs());
@@ -162,7 +159,7 @@ fn weights_are_the_settings_then_the_cost_then_brysons() {
 #[test]
 fn bang_bang_holds_the_pole() {
     let scenario = scenario("cart-pole-sd");
-    let solution = solved(SolverKind::Lqg, &scenario);
+    let solution = solved(&Lqg::default(), &scenario);
     assert_eq!(earned(&solution, &scenario, 40).failed, 0.0);
 }
 
@@ -171,8 +168,9 @@ fn in_the_corridor_without_walls_both_are_optimal() {
     let scenario = scenario("corridor-unbounded");
     let model = &scenario.model;
     let mdp = BeliefMdp::new(model);
-    for kind in [SolverKind::Qmdp, SolverKind::Mls] {
-        let solution = solved(kind, &scenario);
+    let planners: [&dyn Planner; 2] = [&Qmdp::default(), &Mls::default()];
+    for planner in planners {
+        let solution = solved(planner, &scenario);
         assert!(solution.converged);
         assert_near(earned(&solution, &scenario, 20_000).discounted, 0.82928);
         let pilotage::solve::Solved::Rule { policy, .. } = &solution.policy else {
@@ -195,7 +193,7 @@ fn in_the_corridor_without_walls_both_are_optimal() {
                     model.actions[policy.action(&belief)].name,
                     action,
                     "{} at {x}",
-                    kind.name()
+                    planner.name()
                 );
             }
         }
@@ -206,11 +204,11 @@ fn in_the_corridor_without_walls_both_are_optimal() {
 fn where_looking_pays_both_fall_short() {
     let scenario = scenario("corridor-declare");
     let best = 2.6876;
-    let mls = earned(&solved(SolverKind::Mls, &scenario), &scenario, 20_000).discounted;
+    let mls = earned(&solved(&Mls::default(), &scenario), &scenario, 20_000).discounted;
     // Replanning that always declares at the most likely goal earns 2.003.
     assert_near(mls, 2.003);
     // Q_MDP expects to know where it is after one more step, so it waits for ever: 0.01 a step, 200 steps.
-    let solution = solved(SolverKind::Qmdp, &scenario);
+    let solution = solved(&Qmdp::default(), &scenario);
     assert!(solution.planned_value.unwrap() > best);
     let waiting = -0.01 * (1.0 - 0.95_f64.powi(200)) / (1.0 - 0.95);
     let qmdp = earned(&solution, &scenario, 1000).discounted;
@@ -225,7 +223,7 @@ fn at_the_doors_one_listens_and_the_other_does_not() {
     let scenario = scenario("tiger");
     let model = &scenario.model;
     let mdp = BeliefMdp::new(model);
-    let qmdp = solved(SolverKind::Qmdp, &scenario);
+    let qmdp = solved(&Qmdp::default(), &scenario);
     // Listen once, then know: -1 + 0.75 * 10.
     assert!((qmdp.planned_value.unwrap() - 6.5).abs() < 1e-5);
     let pilotage::solve::Solved::Rule { policy, .. } = &qmdp.policy else {
@@ -264,7 +262,7 @@ fn at_the_doors_one_listens_and_the_other_does_not() {
         "{best:?}"
     );
 
-    let mls = solved(SolverKind::Mls, &scenario);
+    let mls = solved(&Mls::default(), &scenario);
     assert!((mls.planned_value.unwrap() - 10.0).abs() < 1e-12);
     let mls = earned(&mls, &scenario, 10_000);
     assert_eq!(mls.steps.mean, 1.0);
@@ -276,8 +274,9 @@ fn without_noise_both_know_everything() {
     let scenario = scenario("load-unload");
     let g: f64 = 0.75;
     let cycle = (1.0 + g.powi(5)) / (1.0 - g.powi(10));
-    for kind in [SolverKind::Qmdp, SolverKind::Mls] {
-        let solution = solved(kind, &scenario);
+    let planners: [&dyn Planner; 2] = [&Qmdp::default(), &Mls::default()];
+    for planner in planners {
+        let solution = solved(planner, &scenario);
         assert!(
             (solution.planned_value.unwrap() - cycle).abs() < 1e-5,
             "{:?}",
@@ -288,12 +287,11 @@ fn without_noise_both_know_everything() {
         assert_eq!(evaluation.undiscounted.mean, 20.0);
         for form in [Form::Nearest, Form::Segments] {
             // Every belief is met on the border of a region.
-            let settings = SolveSettings {
-                form,
-                runs: Some(10),
-                ..Default::default()
+            let request = Request {
+                runs: 10,
+                ..Request::form(form)
             };
-            let compiled = solve(kind, &scenario, &settings, &Silent).unwrap();
+            let compiled = plan(planner, &scenario.model, &request, &Silent).unwrap();
             assert_eq!(earned(&compiled, &scenario, 3).undiscounted.mean, 20.0);
         }
     }

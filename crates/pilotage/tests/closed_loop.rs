@@ -14,7 +14,7 @@ use pilotage::policy::{Controller, Matching, Policy};
 use pilotage::scenario::Scenario;
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::compile::{self, compile};
-use pilotage::solve::kbvi::closed::{GridPolicy, Settings, solve};
+use pilotage::solve::value_iteration::{GridPolicy, Settings, solve};
 
 fn plan(model: &Model, points: Option<usize>) -> GridPolicy {
     let settings = Settings {
@@ -162,7 +162,7 @@ fn the_tiger_is_worth_4_1065() {
             matching,
             ..compile::Settings::default()
         };
-        let automaton = compile(&policy, policy.mdp(), "kbvi-closed", &settings).unwrap();
+        let automaton = compile(&policy, policy.mdp(), "value-iteration", &settings).unwrap();
         let earned = evaluated(&scenario, &Controller::new(&automaton), 100_000).discounted;
         assert!(earned.mean >= 4.05, "{matching:?}: {earned:?}");
         assert!(
@@ -214,7 +214,7 @@ fn compiled_corridors_decide_as_the_grid_does() {
             matching,
             ..compile::Settings::default()
         };
-        let automaton = compile(&policy, policy.mdp(), "kbvi-closed", &settings).unwrap();
+        let automaton = compile(&policy, policy.mdp(), "value-iteration", &settings).unwrap();
         assert_eq!(automaton.nodes.len(), 3, "{matching:?}");
         for level in 0..policy.mdp().levels().len() {
             assert!((border(&automaton, level, 2.0, 3.5) - 3.0).abs() < 1e-3);

@@ -1,6 +1,6 @@
 //! CMA-ES on functions with known minima.
 
-use pilotage::solve::cma::Evolution;
+use pilotage::solve::policy_search::cma::Evolution;
 
 fn minimise(f: impl Fn(&[f64]) -> f64, start: &[f64], generations: usize) -> Vec<f64> {
     let mut evolution = Evolution::new(start, 0.5, 10, 1);

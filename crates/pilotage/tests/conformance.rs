@@ -1,6 +1,9 @@
 //! Every built-in model with every solver that accepts it, and what the others say.
 #![allow(clippy::unwrap_used)]
 
+mod common;
+
+use common::{short, small};
 use pilotage::Error;
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::model::{Interval, Model, Region};
@@ -9,52 +12,20 @@ use pilotage::policy::{Automaton, Controller, Policy};
 use pilotage::random::{Rng, Role, normal, stream};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Options;
-use pilotage::solve::{Form, Solution, SolveSettings, Solved, SolverKind, rollout, solve};
-use pilotage::solve::{arkaq, kafaq};
-
-/// Settings small enough for a test of all pairs; what is found need not be good.
-fn small(model: &Model, form: Form) -> SolveSettings {
-    SolveSettings {
-        form,
-        points: Some(match model.state_dim() {
-            1 => 161,
-            2 => 33,
-            _ => 3,
-        }),
-        horizons: 1..=2,
-        runs: Some(20),
-        effort: 1e-3,
-        kafaq: kafaq::Settings {
-            epoch: 500,
-            epoch_per_cell: 1,
-            epoch_limit: 2,
-            cells_along: 8,
-            trial: 10,
-            ..Default::default()
-        },
-        arkaq: arkaq::Settings {
-            vigilances: vec![0.5],
-            scout: 200,
-            settle: 50,
-            explore_limit: 1000,
-            state_limit: 20,
-            epoch: 500,
-            epoch_per_entry: 1,
-            epoch_limit: 2,
-            trial: 10,
-            ..Default::default()
-        },
-        ..Default::default()
-    }
-}
+use pilotage::solve::value_iteration::Settings;
+use pilotage::solve::{
+    Entry, Form, Lqg, Mls, Planner, Qmdp, Registry, Request, Solution, Solved, ValueIteration,
+    plan, rollout, solve,
+};
 
 /// Every pair of a built-in model and a solver.
-fn pairs() -> impl Iterator<Item = (Scenario, SolverKind)> {
+fn pairs() -> impl Iterator<Item = (Scenario, Entry)> {
     scenario::names().flat_map(|name| {
         let scenario = scenario::find(name).unwrap();
-        SolverKind::ALL
+        let entries = Registry::builtin().entries().to_vec();
+        entries
             .into_iter()
-            .map(move |kind| (scenario.clone(), kind))
+            .map(move |entry| (scenario.clone(), entry))
     })
 }
 
@@ -178,18 +149,18 @@ fn check_value(scenario: &Scenario, solution: &Solution, what: &str) {
 #[test]
 fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
     let mut solved = 0;
-    let accepted = pairs().filter(|(scenario, kind)| kind.accepts(&scenario.model).is_ok());
-    for (scenario, kind) in accepted {
+    let accepted = pairs().filter(|(scenario, entry)| entry.accepts(&scenario.model).is_ok());
+    for (scenario, entry) in accepted {
         let model = &scenario.model;
         let mdp = BeliefMdp::new(model);
         for form in Form::ALL {
-            let what = format!("{} with {} as {}", model.name, kind.name(), form.name());
-            let solution = solve(kind, &scenario, &small(model, form), &Silent)
+            let what = format!("{} with {} as {}", model.name, entry.name(), form.name());
+            let solution = solve(&small(&entry, model), &scenario, &short(form), &Silent)
                 .unwrap_or_else(|error| panic!("{what}: {error}"));
             match &solution.policy {
                 Solved::Automaton(automaton) => {
                     assert_ne!(form, Form::Grid, "{what}");
-                    assert_eq!(automaton.solver, kind.name());
+                    assert_eq!(automaton.solver, entry.name());
                     check_policy(&mdp, automaton, &what);
                     check_automaton(&mdp, automaton, &what);
                 }
@@ -208,9 +179,9 @@ fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
 
 #[test]
 fn a_solver_that_does_not_accept_a_model_says_why_and_what_would_do() {
-    for (scenario, kind) in pairs() {
+    for (scenario, entry) in pairs() {
         let model = &scenario.model;
-        let Err(error) = kind.accepts(model) else {
+        let Err(error) = entry.accepts(model) else {
             continue;
         };
         let Error::Unsupported {
@@ -221,14 +192,15 @@ fn a_solver_that_does_not_accept_a_model_says_why_and_what_would_do() {
         else {
             panic!("{error}");
         };
-        assert_eq!((*solver, named), (kind.name(), &model.name));
+        assert_eq!((*solver, named), (entry.name(), &model.name));
         assert!(
             ["add ", "use ", "set "]
                 .iter()
                 .any(|hint| reason.contains(hint)),
             "{error}"
         );
-        let refused = solve(kind, &scenario, &SolveSettings::default(), &Silent);
+        let solver = entry.solver(&[]).unwrap();
+        let refused = solve(&solver, &scenario, &Request::default(), &Silent);
         assert_eq!(
             refused.map(|_| ()).unwrap_err().to_string(),
             error.to_string()
@@ -238,39 +210,67 @@ fn a_solver_that_does_not_accept_a_model_says_why_and_what_would_do() {
 
 #[test]
 fn every_model_has_a_solver_and_every_solver_a_model() {
+    let registry = Registry::builtin();
     for name in scenario::names() {
         let model = scenario::find(name).unwrap().model;
-        assert!(
-            SolverKind::ALL
-                .iter()
-                .any(|kind| kind.accepts(&model).is_ok()),
-            "{name}"
-        );
+        let first = registry.first_for(&model).unwrap();
+        assert!(!first.learns() && first.accepts(&model).is_ok(), "{name}");
     }
-    for kind in SolverKind::ALL {
-        assert!(
-            pairs().any(|(scenario, other)| other == kind && kind.accepts(&scenario.model).is_ok())
-        );
-        assert_eq!(SolverKind::parse(kind.name()).unwrap(), kind);
-        assert!(!kind.about().is_empty());
+    for entry in registry.entries() {
+        let name = entry.name();
+        assert!(pairs().any(
+            |(scenario, other)| other.name() == name && entry.accepts(&scenario.model).is_ok()
+        ));
+        assert_eq!(registry.find(name).unwrap().name(), name);
+        let solver = entry.solver(&[]).unwrap();
+        assert_eq!((solver.name(), solver.learns()), (name, entry.learns()));
+        assert!(!entry.about().is_empty());
+    }
+    for (model, first) in [
+        ("corridor", "value-iteration"),
+        ("cart-pole", "policy-search"),
+        ("scalar-lqg", "lqg"),
+    ] {
+        let model = scenario::find(model).unwrap().model;
+        assert_eq!(registry.first_for(&model).unwrap().name(), first);
     }
 }
 
 #[test]
 fn misspelt_names_bring_the_nearest() {
-    let error = SolverKind::parse("kbvi-close").unwrap_err();
+    let registry = Registry::builtin();
+    let error = registry.find("value-iterations").unwrap_err();
     assert_eq!(
         error.to_string(),
-        "there is no solver `kbvi-close` (hint: did you mean `kbvi-closed`?)"
+        "there is no solver `value-iterations` (hint: did you mean `value-iteration`?)"
     );
-    let error = SolverKind::parse("value-iteration")
-        .unwrap_err()
-        .to_string();
-    for kind in SolverKind::ALL {
-        assert!(error.contains(kind.name()), "{error}");
+    let error = registry.find("dynamic programming").unwrap_err();
+    for entry in registry.entries() {
+        assert!(error.to_string().contains(entry.name()), "{error}");
     }
+    assert_eq!(
+        registry.find("kbvi-closed").unwrap().name(),
+        "value-iteration"
+    );
     let error = Form::parse("segment").unwrap_err().to_string();
     assert!(error.contains("did you mean `segments`?"), "{error}");
+}
+
+#[test]
+fn a_setting_that_a_solver_does_not_have_lists_those_it_has() {
+    for entry in Registry::builtin().entries() {
+        let none = [("colour".to_owned(), "1".to_owned())];
+        let error = entry.solver(&none).map(|_| ()).unwrap_err().to_string();
+        let known = entry.settings();
+        assert!(!known.is_empty());
+        for info in known {
+            assert!(error.contains(&format!("`{}`", info.name)), "{error}");
+            assert!(!info.about.is_empty(), "{}: {}", entry.name(), info.name);
+            // Every default can be said.
+            let told = [(info.name.clone(), info.default.clone())];
+            assert!(entry.solver(&told).is_ok(), "{}: {told:?}", entry.name());
+        }
+    }
 }
 
 /// A corridor with a second variable `y` that drifts by `factor` a step, is sensed by `sensed` and disturbed by `noise`.
@@ -308,15 +308,11 @@ fn with_drift(factor: f64, sensed: f64, noise: f64) -> Scenario {
 fn uncertainty_that_grows_for_ever_is_refused_with_its_direction() {
     // Not detectable: a random walk, and an unstable variable, that no sensor shows.
     for factor in [1.0, 1.2] {
-        for kind in [
-            SolverKind::KbviClosed,
-            SolverKind::Kbvi,
-            SolverKind::Qmdp,
-            SolverKind::Mls,
-        ] {
+        for name in ["value-iteration", "kbvi", "qmdp", "mls"] {
             let scenario = with_drift(factor, 0.0, 0.1);
-            let settings = small(&scenario.model, Form::Nearest);
-            let error = solve(kind, &scenario, &settings, &Silent)
+            let registry = Registry::builtin();
+            let solver = small(registry.find(name).unwrap(), &scenario.model);
+            let error = solve(&solver, &scenario, &short(Form::Nearest), &Silent)
                 .map(|_| ())
                 .unwrap_err();
             let Error::NoSteadyState { direction, .. } = &error else {
@@ -332,8 +328,11 @@ fn uncertainty_that_grows_for_ever_is_refused_with_its_direction() {
     }
     // Detectable: sensed, or dying out by itself.
     for scenario in [with_drift(1.2, 1.0, 0.1), with_drift(0.9, 0.0, 0.1)] {
-        let settings = small(&scenario.model, Form::Grid);
-        solve(SolverKind::Mls, &scenario, &settings, &Silent).unwrap();
+        let grid = Settings {
+            points: Some(25),
+            ..Settings::default()
+        };
+        plan(&Mls { grid }, &scenario.model, &short(Form::Grid), &Silent).unwrap();
     }
 }
 
@@ -345,10 +344,10 @@ fn a_regulator_that_cannot_be_is_refused_with_its_direction() {
         (0, Interval::new(-1.0, 1.0)),
         (1, Interval::new(-1.0, 1.0)),
     ]);
-    let error = solve(
-        SolverKind::Lqg,
-        &scenario,
-        &SolveSettings::default(),
+    let error = plan(
+        &Lqg::default(),
+        &scenario.model,
+        &Request::default(),
         &Silent,
     )
     .map(|_| ())
@@ -371,13 +370,14 @@ fn a_regulator_that_cannot_be_is_refused_with_its_direction() {
 #[test]
 fn a_grid_that_is_too_large_is_refused_with_its_size() {
     let scenario = scenario::find("maze-2d").unwrap();
-    for kind in [SolverKind::KbviClosed, SolverKind::Qmdp, SolverKind::Mls] {
-        let settings = SolveSettings {
-            points: Some(1001),
-            memory: 16,
-            ..Default::default()
-        };
-        let error = solve(kind, &scenario, &settings, &Silent)
+    let grid = Settings {
+        points: Some(1001),
+        memory: 16,
+        ..Default::default()
+    };
+    let planners: [&dyn Planner; 3] = [&ValueIteration { grid }, &Qmdp { grid }, &Mls { grid }];
+    for planner in planners {
+        let error = plan(planner, &scenario.model, &Request::default(), &Silent)
             .map(|_| ())
             .unwrap_err();
         let Error::TooLarge {

@@ -10,7 +10,8 @@ use pilotage::policy::{Automaton, Matching, Policy};
 use pilotage::random::{Role, normal, stream, uniform};
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::compile::{self, compile};
-use pilotage::solve::kbvi::{branches, closed, generate};
+use pilotage::solve::kbvi::{branches, generate};
+use pilotage::solve::value_iteration;
 
 fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     let pool = rayon::ThreadPoolBuilder::new()
@@ -43,12 +44,12 @@ fn bits(evaluation: &Evaluation) -> Vec<u64> {
 fn solved(name: &str, points: usize, matching: Matching) -> (Vec<u64>, Automaton, Vec<u64>) {
     let scenario = scenario(name);
     let mdp = BeliefMdp::new(&scenario.model);
-    let settings = closed::Settings {
+    let settings = value_iteration::Settings {
         points: Some(points),
         tolerance: 1e-5,
-        ..closed::Settings::default()
+        ..value_iteration::Settings::default()
     };
-    let policy = closed::solve(&mdp, &settings, &Silent).unwrap();
+    let policy = value_iteration::solve(&mdp, &settings, &Silent).unwrap();
     let values = (0..50)
         .map(|k| {
             let mean = vec![f64::from(k) / 10.0; scenario.model.state_dim()];
@@ -65,7 +66,7 @@ fn solved(name: &str, points: usize, matching: Matching) -> (Vec<u64>, Automaton
         episodes: 20,
         ..compile::Settings::default()
     };
-    let automaton = compile(&policy, &mdp, "kbvi-closed", &settings).unwrap();
+    let automaton = compile(&policy, &mdp, "value-iteration", &settings).unwrap();
     let options = Options {
         episodes: 1001,
         seed: 7,

@@ -7,8 +7,9 @@ use pilotage::observe::Silent;
 use pilotage::policy::{Controller, Policy};
 use pilotage::scenario::{Scenario, find, read};
 use pilotage::simulate::{LifeOptions, Options, evaluate, life};
-use pilotage::solve::hazard::{Runs, Sample};
-use pilotage::solve::kbvi::{closed, quadratic};
+use pilotage::solve::policy_search::failure::{Runs, Sample};
+use pilotage::solve::policy_search::search;
+use pilotage::solve::{Planner, PolicySearch, value_iteration};
 
 /// An unstable variable that has to be kept within limits.
 fn edge(failure_reward: f64) -> Model {
@@ -62,7 +63,8 @@ fn value_iteration_counts_failures() {
     for failure_reward in [0.0, -5.0] {
         let model = edge(failure_reward);
         let mdp = BeliefMdp::new(&model);
-        let policy = closed::solve(&mdp, &closed::Settings::default(), &Silent).unwrap();
+        let policy =
+            value_iteration::solve(&mdp, &value_iteration::Settings::default(), &Silent).unwrap();
         assert!(policy.converged);
         let options = Options {
             episodes: 20_000,
@@ -95,7 +97,8 @@ fn value_iteration_counts_failures() {
 fn the_price_of_failing_changes_what_is_done() {
     let action_at = |failure_reward: f64, x: f64| {
         let mdp = BeliefMdp::new(&edge(failure_reward));
-        let policy = closed::solve(&mdp, &closed::Settings::default(), &Silent).unwrap();
+        let policy =
+            value_iteration::solve(&mdp, &value_iteration::Settings::default(), &Silent).unwrap();
         policy.action(&Belief {
             level: mdp.levels().len() - 1,
             mode: 0,
@@ -140,10 +143,10 @@ fn lives_are_counted_exactly() {
     assert_eq!(life.unfailing(), 0);
 }
 
-fn pole(name: &str, effort: f64) -> (Model, BeliefMdp, quadratic::Settings) {
+fn pole(name: &str, effort: f64) -> (Model, BeliefMdp, PolicySearch) {
     let model = find(name).expect("a built-in model").model;
     let mdp = BeliefMdp::new(&model);
-    let settings = quadratic::Settings {
+    let settings = PolicySearch {
         effort,
         ..Default::default()
     };
@@ -164,7 +167,7 @@ fn hazard_foretells_life() {
         *side = Interval::new(0.8 * side.low, 0.8 * side.high);
     }
     let mdp = BeliefMdp::new(&model);
-    let automaton = quadratic::solve(&mdp, &settings, &Silent).unwrap();
+    let automaton = search(&mdp, &settings, 1, &Silent).unwrap();
     assert_eq!(automaton.nodes.len(), 2);
     let policy = Controller::new(&automaton);
     let sample = Sample {
@@ -201,7 +204,7 @@ fn planning_does_not_depend_on_threads() {
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| quadratic::solve(&mdp, &settings, &Silent).unwrap())
+        pool.install(|| search(&mdp, &settings, 1, &Silent).unwrap())
     };
     let alone = plan(1);
     assert_eq!(alone.nodes.len(), 6);
@@ -215,22 +218,23 @@ fn models_without_a_planner_are_told_what_to_change() {
         Err(Error::Unsupported { reason, .. }) => reason,
         other => panic!("{other:?}"),
     };
-    let grid = closed::solve(&mdp, &closed::Settings::default(), &Silent).map(|_| ());
-    assert!(refusal(grid).contains("at most 3"));
-    let huge = closed::Settings {
+    let grid =
+        value_iteration::solve(&mdp, &value_iteration::Settings::default(), &Silent).map(|_| ());
+    assert!(refusal(grid).contains("use policy-search"));
+    let huge = value_iteration::Settings {
         points: Some(100),
         ..Default::default()
     };
     assert!(matches!(
-        closed::solve(&mdp, &huge, &Silent),
+        value_iteration::solve(&mdp, &huge, &Silent),
         Err(Error::TooLarge { .. })
     ));
     let off_centre = Interval::new(0.1, 2.4);
     model.episode.alive = Region::new(vec![(0, off_centre)]);
-    let moved = quadratic::solve(&BeliefMdp::new(&model), &settings, &Silent).map(|_| ());
+    let moved = search(&BeliefMdp::new(&model), &settings, 1, &Silent).map(|_| ());
     assert!(refusal(moved).contains("`position`"));
     model.episode.alive = Region::everywhere();
-    assert!(!quadratic::suits(&model));
-    let free = quadratic::solve(&BeliefMdp::new(&model), &settings, &Silent).map(|_| ());
+    assert!(settings.accepts(&model).is_err());
+    let free = search(&BeliefMdp::new(&model), &settings, 1, &Silent).map(|_| ());
     assert!(refusal(free).contains("`alive`"));
 }

@@ -11,8 +11,9 @@ use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller, Place};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{LifeOptions, Options, compare, evaluate, life};
-use pilotage::solve::kafaq::{self, Learned, Rules, Run, Settings};
-use pilotage::solve::kbvi::closed;
+use pilotage::solve::Run;
+use pilotage::solve::kafaq::{self, Learned, Rules, Settings};
+use pilotage::solve::value_iteration;
 use pilotage::world::{ProblemWorld, World};
 use pilotage::{Error, Result};
 
@@ -75,9 +76,9 @@ fn the_hallway_is_learned_in_three_regions_as_well_as_it_can_be_planned() {
             "{name}: {:?}",
             places(&learned.automaton)
         );
-        let plan = closed::solve(
+        let plan = value_iteration::solve(
             &BeliefMdp::new(&scenario.model),
-            &closed::Settings::default(),
+            &value_iteration::Settings::default(),
             &Silent,
         )
         .unwrap();
@@ -209,9 +210,10 @@ fn a_resumed_run_ends_like_one_that_was_never_stopped() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.json");
     for pieces in [1, 5, 9] {
-        let mut run = Run::new(&scenario.model, &worlds, &settings).unwrap();
+        let mut run =
+            Run::new(kafaq::course(&scenario.model, &worlds, &settings).unwrap()).unwrap();
         for _ in 0..pieces {
-            run.advance(&Silent);
+            let _ = run.step(&Silent).unwrap();
         }
         run.save(&path).unwrap();
         assert_eq!(
@@ -271,10 +273,11 @@ fn a_run_survives_being_killed_at_any_moment() {
         child.wait().unwrap();
         if path.exists() {
             // Whole, and of this run.
-            let run = Run::resume(&scenario.model, &worlds, &lengthy(), &path).unwrap();
-            if run.finished() {
-                break;
-            }
+            let course = kafaq::course(&scenario.model, &worlds, &lengthy()).unwrap();
+            Run::resume(course, &path).unwrap();
+        }
+        if done {
+            break;
         }
     }
     assert!(killed > 0);
@@ -287,8 +290,8 @@ fn a_run_survives_being_killed_at_any_moment() {
 /// A checkpoint after one piece of work.
 fn checkpoint(scenario: &Scenario, settings: &Settings, path: &Path) {
     let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(scenario)) };
-    let mut run = Run::new(&scenario.model, &worlds, settings).unwrap();
-    run.advance(&Silent);
+    let mut run = Run::new(kafaq::course(&scenario.model, &worlds, settings).unwrap()).unwrap();
+    let _ = run.step(&Silent).unwrap();
     run.save(path).unwrap();
 }
 

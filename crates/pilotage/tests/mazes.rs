@@ -10,7 +10,7 @@ use pilotage::policy::{Automaton, Policy};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Options, evaluate};
 use pilotage::solve::compile::{self, compile};
-use pilotage::solve::kbvi::closed::{self, GridPolicy};
+use pilotage::solve::value_iteration::{self, GridPolicy};
 use pilotage::world::{Draws, ProblemWorld, World};
 
 fn find(name: &str) -> Scenario {
@@ -18,7 +18,7 @@ fn find(name: &str) -> Scenario {
 }
 
 fn plan(mdp: &BeliefMdp) -> GridPolicy {
-    closed::solve(mdp, &closed::Settings::default(), &Silent).unwrap()
+    value_iteration::solve(mdp, &value_iteration::Settings::default(), &Silent).unwrap()
 }
 
 /// The unbounded maze, planned once for all tests.
@@ -32,7 +32,7 @@ fn automaton(mdp: &BeliefMdp, policy: &GridPolicy, episodes: usize) -> Automaton
         episodes,
         ..compile::Settings::default()
     };
-    compile(policy, mdp, "kbvi-closed", &settings).unwrap()
+    compile(policy, mdp, "value-iteration", &settings).unwrap()
 }
 
 /// Way of the true state under a plan of actions.

@@ -6,7 +6,8 @@ use pilotage::model::{Model, Steps};
 use pilotage::observe::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Options;
-use pilotage::solve::{Earned, Form, Solution, SolveSettings, SolverKind, solve};
+use pilotage::solve::value_iteration::Settings;
+use pilotage::solve::{Earned, Form, Request, Solution, ValueIteration, plan};
 
 /// A hallway, to be changed by each test.
 const HALLWAY: &str = r#"
@@ -42,11 +43,23 @@ fn hallway(changes: &[(&str, &str)]) -> Scenario {
 }
 
 fn planned(scenario: &Scenario, form: Form) -> pilotage::Result<Solution> {
-    let settings = SolveSettings {
-        form,
-        ..SolveSettings::default()
-    };
-    solve(SolverKind::KbviClosed, scenario, &settings, &Silent)
+    let request = Request::form(form);
+    plan(
+        &ValueIteration::default(),
+        &scenario.model,
+        &request,
+        &Silent,
+    )
+}
+
+/// Few points, whatever is paid.
+fn coarse() -> ValueIteration {
+    ValueIteration {
+        grid: Settings {
+            points: Some(41),
+            ..Settings::default()
+        },
+    }
 }
 
 fn earned(scenario: &Scenario, solution: &Solution) -> Earned {
@@ -250,11 +263,7 @@ fn a_grid_resolves_what_is_paid() {
     ]);
     // The default becomes as fine as it has to be.
     keeps(&narrow, Form::Grid);
-    let settings = SolveSettings {
-        points: Some(41),
-        ..SolveSettings::default()
-    };
-    let error = solve(SolverKind::KbviClosed, &narrow, &settings, &Silent);
+    let error = plan(&coarse(), &narrow.model, &Request::default(), &Silent);
     let error = error.map(|_| ()).unwrap_err().to_string();
     assert!(
         error.contains("reward 1 is 0.3") && error.contains("--grid"),
@@ -269,12 +278,11 @@ fn a_promise_that_is_not_kept_says_why() {
         ("n-maze", "told which of its starts"),
     ] {
         let scenario = scenario::find(name).unwrap();
-        let settings = SolveSettings {
-            points: Some(41),
-            runs: Some(200),
-            ..SolveSettings::default()
+        let request = Request {
+            runs: 200,
+            ..Request::default()
         };
-        let solution = solve(SolverKind::KbviClosed, &scenario, &settings, &Silent).unwrap();
+        let solution = plan(&coarse(), &scenario.model, &request, &Silent).unwrap();
         let earned = earned(&scenario, &solution);
         let said = earned
             .remarks

@@ -10,7 +10,7 @@ use pilotage::policy::Policy;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Agent;
 use pilotage::simulate::wake_up::{Choice, Settings, WakeUp, WakeUpAgent, measure};
-use pilotage::solve::kbvi::closed::{self, GridPolicy};
+use pilotage::solve::value_iteration::{self, GridPolicy};
 
 fn scenario(name: &str) -> Scenario {
     scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
@@ -23,7 +23,9 @@ fn mdp(name: &str) -> BeliefMdp {
 /// The mazes, planned once for all tests.
 fn plan(name: &str) -> &'static GridPolicy {
     static PLANS: [OnceLock<GridPolicy>; 2] = [const { OnceLock::new() }; 2];
-    let plan = || closed::solve(&mdp(name), &closed::Settings::default(), &Silent).unwrap();
+    let plan = || {
+        value_iteration::solve(&mdp(name), &value_iteration::Settings::default(), &Silent).unwrap()
+    };
     PLANS[usize::from(name == "u-maze")].get_or_init(plan)
 }
 

@@ -18,7 +18,7 @@ use pilotage::observe::Silent;
 use pilotage::policy::write_whole;
 use pilotage::scenario;
 use pilotage::simulate::Options;
-use pilotage::solve::kbvi::closed;
+use pilotage::solve::value_iteration;
 use pilotage_thesis::baseline::{Baseline, baselines};
 use serde_json::json;
 
@@ -90,8 +90,13 @@ fn measure(name: &str, seeds: u64) -> Measured {
     let robot = ON_ROBOT
         .contains(&name)
         .then(|| scenario::find(format!("robot-{name}")).unwrap());
-    let baselines =
-        baselines(&scenario, &closed::Settings::default(), EVALUATION, &Silent).unwrap();
+    let baselines = baselines(
+        &scenario,
+        &value_iteration::Settings::default(),
+        EVALUATION,
+        &Silent,
+    )
+    .unwrap();
     let runs = (1..=seeds)
         .map(|seed| {
             eprintln!("{name}, seed {seed}");

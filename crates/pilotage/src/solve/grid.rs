@@ -1,22 +1,40 @@
 //! Functions on a regular grid of means: interpolation, and averaging over a Gaussian.
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::belief::gaussian::normal_density;
 use crate::belief::kalman::square_root;
+use crate::error::Result;
 use crate::model::Interval;
+use crate::solve::settings::ensure;
 
 /// Settings of value iteration on a grid.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Settings {
-    /// Points of the grid along each variable, at least 2; `None` for the default of the number of variables.
+    /// Points of the grid along each variable; at least 2, or `auto` for what suits the number of variables.
     pub points: Option<usize>,
-    /// Largest error of the fixed point, in units of reward, above 0.
+    /// Largest error of the fixed point, in units of reward; more than 0.
     pub tolerance: f64,
     /// Most sweeps, over one group of levels where there are levels; at least 1.
     pub sweeps: usize,
-    /// Most memory for the grid, MiB.
+    /// Most memory for the grid, MiB; at least 0.
     pub memory: u64,
+}
+
+impl Settings {
+    /// Checks every setting against its range.
+    ///
+    /// # Errors
+    /// [`crate::Error::Setting`] for the first that is out of range.
+    pub fn validate(&self) -> Result<()> {
+        let points = self.points.unwrap_or(2);
+        ensure("points", points, points >= 2, "at least 2")?;
+        let tolerance = self.tolerance;
+        ensure("tolerance", tolerance, tolerance > 0.0, "above 0")?;
+        ensure("sweeps", self.sweeps, self.sweeps >= 1, "at least 1")
+    }
 }
 
 impl Default for Settings {

@@ -11,6 +11,8 @@ use nalgebra::DVector;
 
 pub use super::grid::Settings;
 use super::grid::{Axis, Grid, Interpolation, Smoother};
+use super::refusals;
+use super::solver::refuse_if;
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
 use crate::model::{ActionId, HypothesisBelief, ModeId, Model, Outcome, Then, WallBelief};
@@ -87,7 +89,7 @@ impl StateMdp {
         settings: &Settings,
         observer: &dyn Observer,
     ) -> Result<Self> {
-        check(settings)?;
+        settings.validate()?;
         let space = space(belief_mdp, settings)?;
         let (modes, actions) = (
             belief_mdp.model().modes.len(),
@@ -279,25 +281,25 @@ fn seen(model: &Model, mode: ModeId, state: &[f64], action: ActionId) -> (f64, O
     (reward, happened.unwrap_or_else(|| tally.rest()))
 }
 
-fn check(settings: &Settings) -> Result<()> {
-    let fail = |setting, value: String, range| {
-        Err(Error::Setting {
-            setting,
-            value,
-            range,
+/// Whether a planner on true states is made for such a model.
+///
+/// # Errors
+/// [`Error::Unsupported`] in the planner's name, with the reason and what would do.
+pub fn accepts(solver: &'static str, model: &Model) -> Result<()> {
+    let (n, most) = (model.state_dim(), MOST_VARIABLES);
+    let too_many = || {
+        (n > most).then(|| {
+            format!(
+                "it has {n} state variables, and a grid of true states is fine enough for {most} at most; use policy-search or lqg"
+            )
         })
     };
-    match settings.points {
-        Some(points) if points < 2 => return fail("points", points.to_string(), "at least 2"),
-        _ => {}
-    }
-    if settings.tolerance.is_nan() || settings.tolerance <= 0.0 {
-        return fail("tolerance", settings.tolerance.to_string(), "above 0");
-    }
-    if settings.sweeps == 0 {
-        return fail("sweeps", "0".to_owned(), "at least 1");
-    }
-    Ok(())
+    let reason = refusals::reward_missing(model)
+        .or_else(|| refusals::pays_afterwards(model))
+        .or_else(|| refusals::changes(model))
+        .or_else(|| refusals::bound_missing(model))
+        .or_else(too_many);
+    refuse_if(solver, model, reason)
 }
 
 fn space(belief_mdp: &BeliefMdp, settings: &Settings) -> Result<Space> {

@@ -5,12 +5,53 @@
 //! # References
 //! I. Nourbakhsh, R. Powers, S. Birchfield, "DERVISH: an office-navigating robot", AI Magazine 16(2), 1995.
 
-use super::mdp::{Settings, Space, StateMdp};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::mdp::{self, Settings, Space, StateMdp};
+use super::settings;
+use super::solver::{Plan, Planner, Problem};
 use crate::belief::{Belief, BeliefMdp};
 use crate::error::Result;
-use crate::model::ActionId;
+use crate::model::{ActionId, Model};
 use crate::observe::Observer;
 use crate::policy::Policy;
+
+/// Name of the solver in errors and policies.
+const SOLVER: &str = "mls";
+
+/// The planner that acts as if the most likely state were certain.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Mls {
+    /// The grid of true states, and how well it is solved.
+    #[serde(flatten)]
+    pub grid: Settings,
+}
+
+impl settings::Settings for Mls {
+    fn validate(&self) -> Result<()> {
+        self.grid.validate()
+    }
+}
+
+impl Planner for Mls {
+    fn name(&self) -> &'static str {
+        SOLVER
+    }
+
+    fn accepts(&self, model: &Model) -> Result<()> {
+        mdp::accepts(SOLVER, model)
+    }
+
+    fn plan(&self, problem: &Problem, observer: &dyn Observer) -> Result<Plan> {
+        let policy = MostLikelyState::solve(problem.mdp(), &self.grid, observer)?;
+        let converged = policy.converged();
+        Ok(Plan {
+            converged,
+            ..Plan::rule(policy, problem.mdp().clone())
+        })
+    }
+}
 
 /// The policy of the underlying decision process ([`super::mdp`]), asked at the most likely state.
 #[derive(Debug)]

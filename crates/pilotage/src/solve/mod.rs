@@ -1,11 +1,13 @@
-//! Solvers: from a model, or from experience, to a policy. [`solve`] runs any of them by name.
+//! Solvers: from a model, or from experience, to a policy.
+//!
+//! A solver is a value that carries its own settings, such as [`ValueIteration`] or [`Kafaq`]. A [`Planner`] is handed a [`Problem`], from
+//! which nothing true can be reached; a [`Learner`] is handed worlds to act in as well. [`plan`], [`learn`] and [`solve`] run them and
+//! bring what they find into the form asked for. [`Registry`] has them by name, their settings as text.
 
 pub mod arkaq;
 pub mod bound;
-pub mod cma;
 pub mod compile;
 pub mod grid;
-pub mod hazard;
 pub mod kafaq;
 pub mod kbvi;
 mod learn;
@@ -13,17 +15,31 @@ pub mod lqg;
 pub mod lqr;
 pub mod mdp;
 pub mod mls;
+pub mod policy_search;
 mod promise;
 pub mod qmdp;
-pub mod refine;
+mod refusals;
+mod registry;
 pub mod rollout;
 mod run;
+mod settings;
 mod solution;
 mod solver;
+pub mod value_iteration;
 pub mod walled;
 
-pub use learn::SettingInfo;
+pub use arkaq::Settings as Arkaq;
+pub use kafaq::Settings as Kafaq;
+pub use kbvi::Kbvi;
+pub use learn::{Course, Learned, Owner, Run, learn as run_course};
+pub use lqg::Lqg;
+pub use mls::Mls;
+pub use policy_search::PolicySearch;
 pub use promise::Earned;
-pub use run::{SolveSettings, solve};
-pub use solution::{Form, Learning, Solution, Solved};
-pub use solver::SolverKind;
+pub use qmdp::Qmdp;
+pub use registry::{Entry, Registry};
+pub use run::{learn, plan, solve};
+pub use settings::{SettingInfo, Settings};
+pub use solution::{Form, Learning, Line, Solution, Solved};
+pub use solver::{Found, Learner, Lesson, Plan, Planner, Problem, Request, Solver, Worlds};
+pub use value_iteration::ValueIteration;

@@ -10,23 +10,64 @@
 //! # References
 //! M. L. Littman, A. R. Cassandra, L. P. Kaelbling, "Learning policies for partially observable environments: scaling up", 1995.
 
-use super::mdp::{Settings, Space, StateMdp};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::mdp::{self, Settings, Space, StateMdp};
+use super::settings;
+use super::solver::{Plan, Planner, Problem};
 use crate::belief::{Belief, BeliefMdp};
 use crate::error::Result;
-use crate::model::ActionId;
+use crate::model::{ActionId, Model};
 use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::{Policy, first_best};
 
+/// Name of the solver in errors and policies.
+const SOLVER: &str = "qmdp";
+
+/// The planner that acts as if all uncertainty were gone after this step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Qmdp {
+    /// The grid of true states, and how well it is solved.
+    #[serde(flatten)]
+    pub grid: Settings,
+}
+
+impl settings::Settings for Qmdp {
+    fn validate(&self) -> Result<()> {
+        self.grid.validate()
+    }
+}
+
+impl Planner for Qmdp {
+    fn name(&self) -> &'static str {
+        SOLVER
+    }
+
+    fn accepts(&self, model: &Model) -> Result<()> {
+        mdp::accepts(SOLVER, model)
+    }
+
+    fn plan(&self, problem: &Problem, observer: &dyn Observer) -> Result<Plan> {
+        let policy = QmdpPolicy::solve(problem.mdp(), &self.grid, observer)?;
+        let converged = policy.converged();
+        Ok(Plan {
+            converged,
+            ..Plan::rule(policy, problem.mdp().clone())
+        })
+    }
+}
+
 /// The policy that is greedy in `Q_MDP`.
 #[derive(Debug)]
-pub struct Qmdp {
+pub struct QmdpPolicy {
     mdp: StateMdp,
     /// `E F(s, a)` for a belief centred on each grid point, by mode, level and action; none where the states are points.
     averaged: Vec<Vec<f64>>,
 }
 
-impl Qmdp {
+impl QmdpPolicy {
     /// Solves the underlying decision process and averages its values over every uncertainty level. The immediate reward is kept
     /// apart: its expectation is known exactly (Eq. 5.2).
     ///
@@ -89,7 +130,7 @@ impl Qmdp {
     }
 }
 
-impl Policy for Qmdp {
+impl Policy for QmdpPolicy {
     fn action(&self, belief: &Belief) -> ActionId {
         first_best(&self.q_values(belief))
     }

@@ -1,6 +1,6 @@
 //! What a solver hands over, in the form asked for.
 
-use super::{arkaq, kafaq, lqg};
+use super::lqg;
 use crate::belief::Filter;
 use crate::error::{Error, Result};
 use crate::model::suggest;
@@ -56,23 +56,26 @@ impl Form {
     }
 }
 
-/// How a learner learned.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Learning {
-    /// KAFAQ: its memory, and its regions epoch by epoch.
-    Kafaq(kafaq::Learning),
-    /// ARKAQ: its clusters, and their values epoch by epoch.
-    Arkaq(arkaq::Learning),
+/// How a learner learned, to be told and drawn.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Learning {
+    /// What was found, in words: `with ...`.
+    pub found: String,
+    /// Reward a step over the steps of experience, a line for each attempt.
+    pub returns: Vec<Line>,
+    /// What the values are of.
+    pub valued: &'static str,
+    /// Value of what it does over the steps of experience, a line for each place or state it tells apart.
+    pub values: Vec<Line>,
 }
 
-impl Learning {
-    /// What was found, in words: `with ...`.
-    pub fn describe(&self) -> String {
-        match self {
-            Self::Kafaq(learning) => learning.memory.clone(),
-            Self::Arkaq(learning) => learning.describe(),
-        }
-    }
+/// A line through points.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Line {
+    /// What it is of.
+    pub name: String,
+    /// Its points, from left to right.
+    pub points: Vec<(f64, f64)>,
 }
 
 /// What a solver found.

@@ -1,181 +1,283 @@
-//! The solvers by name: which there are, and what each accepts.
+//! What a solver is: a planner, which is handed a model, or a learner, which is handed worlds to act in as well.
 
-use super::kbvi::quadratic;
-use super::{SolveSettings, arkaq, kafaq, lqg, mdp};
+use std::path::{Path, PathBuf};
+
+use super::lqg;
+use super::{Form, Learning};
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
-use crate::model::{Interval, Model, When, suggest};
+use crate::model::Model;
+use crate::observe::Observer;
+use crate::policy::{Automaton, Policy};
+use crate::world::World;
 
-/// The solvers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum SolverKind {
-    /// The thesis' open-loop branches (chapter 5).
-    Kbvi,
-    /// Closed-loop KBVI: value iteration on level and mean.
-    KbviClosed,
-    /// The linear-quadratic-Gaussian controller.
-    Lqg,
-    /// Q_MDP (Littman, Cassandra and Kaelbling, 1995).
-    Qmdp,
-    /// Most likely state (Nourbakhsh, Powers and Birchfield, 1995).
-    Mls,
-    /// KAFAQ-learning (thesis chapter 4).
-    Kafaq,
-    /// ARKAQ-learning (thesis chapter 3).
-    Arkaq,
-}
+/// Finds a policy from what is assumed. Its value carries its settings.
+pub trait Planner: Send + Sync {
+    /// Its name, as on the command line and in policies.
+    fn name(&self) -> &'static str;
 
-impl SolverKind {
-    /// All solvers.
-    pub const ALL: [Self; 7] = [
-        Self::KbviClosed,
-        Self::Kbvi,
-        Self::Lqg,
-        Self::Qmdp,
-        Self::Mls,
-        Self::Kafaq,
-        Self::Arkaq,
-    ];
-
-    /// Its name, as on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Kbvi => "kbvi",
-            Self::KbviClosed => "kbvi-closed",
-            Self::Lqg => "lqg",
-            Self::Qmdp => "qmdp",
-            Self::Mls => "mls",
-            Self::Kafaq => "kafaq",
-            Self::Arkaq => "arkaq",
-        }
-    }
-
-    /// What it is, in one line.
-    pub fn about(self) -> &'static str {
-        match self {
-            Self::Kbvi => "open-loop branches to a finite horizon (thesis chapter 5)",
-            Self::KbviClosed => "value iteration on uncertainty level and mean",
-            Self::Lqg => "linear feedback on the mean, for quadratic cost or the nearest action",
-            Self::Qmdp => "acts as if all uncertainty were gone after this step",
-            Self::Mls => "acts as if the most likely state were certain",
-            Self::Kafaq => "learns regions of belief by trial, told neither map nor rewards",
-            Self::Arkaq => "learns clusters of belief by trial, with those before as memory",
-        }
-    }
-
-    /// The solver of that name.
-    ///
-    /// # Errors
-    /// [`Error::Unknown`] with the nearest name.
-    pub fn parse(name: &str) -> Result<Self> {
-        let found = Self::ALL.into_iter().find(|kind| kind.name() == name);
-        found.ok_or_else(|| Error::Unknown {
-            what: "solver",
-            name: name.to_owned(),
-            hint: suggest(name, Self::ALL.map(Self::name)),
-        })
-    }
-
-    /// Whether it learns from experience, rather than plan from the model.
-    pub fn learns(self) -> bool {
-        matches!(self, Self::Kafaq | Self::Arkaq)
-    }
-
-    /// Whether it is made for such a model, with its default settings.
+    /// Whether it is made for such a model, with the settings it has.
     ///
     /// # Errors
     /// [`Error::Unsupported`] with the reason, and what would do.
-    pub fn accepts(self, model: &Model) -> Result<()> {
-        self.accepts_with(model, &SolveSettings::default())
+    fn accepts(&self, model: &Model) -> Result<()>;
+
+    /// Plans.
+    ///
+    /// # Errors
+    /// As [`Planner::accepts`], [`Error::Setting`] for settings out of range, and the planner's own.
+    fn plan(&self, problem: &Problem, observer: &dyn Observer) -> Result<Plan>;
+
+    /// Whether what it finds for a model becomes an automaton: all but a free control does.
+    fn makes_automaton(&self, model: &Model) -> bool {
+        let _ = model;
+        true
+    }
+}
+
+/// Makes a world to act in.
+pub type Worlds<'a> = dyn Fn() -> Box<dyn World> + Sync + 'a;
+
+/// Finds a policy by acting. Its value carries its settings. Most are a [`super::Course`], run by [`super::run_course`].
+pub trait Learner: Send + Sync {
+    /// Its name, as on the command line and in policies.
+    fn name(&self) -> &'static str;
+
+    /// Whether it is made for such a model, with the settings it has.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] with the reason, and what would do; [`Error::Setting`] for settings out of range.
+    fn accepts(&self, model: &Model) -> Result<()>;
+
+    /// Learns in the worlds that `worlds` makes. With a checkpoint file it keeps its state there and goes on from there if the file
+    /// exists.
+    ///
+    /// # Errors
+    /// As [`Learner::accepts`], [`Error::Checkpoint`] for a checkpoint of another run or a damaged one, [`Error::Io`] where it cannot
+    /// be read or written.
+    fn learn(
+        &self,
+        problem: &Problem,
+        worlds: &Worlds<'_>,
+        checkpoint: Option<&Path>,
+        observer: &dyn Observer,
+    ) -> Result<Lesson>;
+}
+
+/// A solver of either kind.
+pub enum Solver {
+    /// Plans from the model.
+    Planner(Box<dyn Planner>),
+    /// Learns from experience.
+    Learner(Box<dyn Learner>),
+}
+
+impl Solver {
+    /// A planner.
+    pub fn planner(planner: impl Planner + 'static) -> Self {
+        Self::Planner(Box::new(planner))
     }
 
-    /// As [`SolverKind::accepts`], for a learner with these settings.
-    pub(super) fn accepts_with(self, model: &Model, settings: &SolveSettings) -> Result<()> {
-        let reason = match self {
-            Self::Kbvi => reward_missing(model).or_else(|| pays_afterwards(model)),
-            Self::KbviClosed if quadratic::suits(model) => {
-                quadratic::refusal(&BeliefMdp::new(model))
-            }
-            Self::KbviClosed => nothing_paid(model).or_else(|| bound_missing(model)),
-            Self::Lqg => lqg::use_of(model).err(),
-            Self::Qmdp | Self::Mls => reward_missing(model)
-                .or_else(|| pays_afterwards(model))
-                .or_else(|| changes(model))
-                .or_else(|| bound_missing(model))
-                .or_else(|| too_many_variables(model)),
-            Self::Kafaq | Self::Arkaq => reward_missing(model),
-        };
-        match reason {
-            None if self == Self::Kafaq => kafaq::accepts(model, &settings.kafaq),
-            None if self == Self::Arkaq => arkaq::accepts(model, &settings.arkaq),
-            None => Ok(()),
-            Some(reason) => Err(Error::Unsupported {
-                solver: self.name(),
-                model: model.name.clone(),
-                reason,
-            }),
+    /// A learner.
+    pub fn learner(learner: impl Learner + 'static) -> Self {
+        Self::Learner(Box::new(learner))
+    }
+
+    /// Its name, as on the command line and in policies.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Planner(planner) => planner.name(),
+            Self::Learner(learner) => learner.name(),
+        }
+    }
+
+    /// Whether it learns from experience, rather than plan from the model.
+    pub fn learns(&self) -> bool {
+        matches!(self, Self::Learner(_))
+    }
+
+    /// Whether it is made for such a model, with the settings it has.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] with the reason, and what would do; [`Error::Setting`] for settings out of range.
+    pub fn accepts(&self, model: &Model) -> Result<()> {
+        match self {
+            Self::Planner(planner) => planner.accepts(model),
+            Self::Learner(learner) => learner.accepts(model),
+        }
+    }
+
+    /// Whether what it finds for a model becomes an automaton: all but a free control does.
+    pub fn makes_automaton(&self, model: &Model) -> bool {
+        match self {
+            Self::Planner(planner) => planner.makes_automaton(model),
+            Self::Learner(_) => true,
         }
     }
 }
 
-/// Those that maximise reward need some, discounted.
-fn nothing_paid(model: &Model) -> Option<String> {
-    let pays = !model.rewards.is_empty()
-        || !model.events.is_empty()
-        || model.episode.failure_reward != 0.0
-        || model.cost.is_some();
-    if !pays {
-        return Some("nothing in it pays a reward; add a [[reward]] or a [cost]".to_owned());
+/// What is asked of a solver, whichever it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Request {
+    /// Form of the policy.
+    pub form: Form,
+    /// Seed of every random number.
+    pub seed: u64,
+    /// Episodes run to see which beliefs a policy meets, at least 1.
+    pub runs: usize,
+    /// File in which a learner keeps its state, to go on from there if it is stopped.
+    pub checkpoint: Option<PathBuf>,
+}
+
+impl Default for Request {
+    fn default() -> Self {
+        Self {
+            form: Form::default(),
+            seed: 1,
+            runs: 2000,
+            checkpoint: None,
+        }
     }
-    None
 }
 
-/// Sums without end need a discount.
-fn reward_missing(model: &Model) -> Option<String> {
-    if let Some(reason) = nothing_paid(model) {
-        return Some(reason);
+impl Request {
+    /// A policy in this form, and everything else by default.
+    pub fn form(form: Form) -> Self {
+        Self {
+            form,
+            ..Self::default()
+        }
     }
-    (model.discount >= 1.0).then(|| {
-        "its discount is 1, and a sum without end needs one below 1; set `discount` to 0.99 or less"
-            .to_owned()
-    })
 }
 
-/// Some solvers pay by `r(s, a)` only.
-fn pays_afterwards(model: &Model) -> Option<String> {
-    let rewards = model.rewards.iter().map(|reward| reward.when);
-    let mut asked = rewards.chain(model.events.iter().map(|event| event.when));
-    asked.any(|when| when == When::After).then(|| {
-        "it pays for where a step has led (`when = \"after\"`), and this solver only for where it begins; use kbvi-closed or state the rewards by action and place".to_owned()
-    })
+/// What a solver is handed: what is assumed and what is asked. Nothing true can be reached from here.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    mdp: BeliefMdp,
+    form: Form,
+    seed: u64,
 }
 
-/// Values of true states do not tell the step.
-fn changes(model: &Model) -> Option<String> {
-    let clock = model.clock();
-    (clock > 0).then(|| {
-        format!("what it pays or changes depends on the step of the episode up to step {clock}, and this solver's values do not; use kbvi-closed")
-    })
+impl Problem {
+    pub(super) fn new(model: &Model, request: &Request) -> Self {
+        Self {
+            mdp: BeliefMdp::new(model),
+            form: request.form,
+            seed: request.seed,
+        }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        self.mdp.model()
+    }
+
+    /// The belief decision process of the model.
+    pub fn mdp(&self) -> &BeliefMdp {
+        &self.mdp
+    }
+
+    /// Form in which the policy is wanted. A planner may hand over any; it is brought into this form afterwards.
+    pub fn form(&self) -> Form {
+        self.form
+    }
+
+    /// Seed of every random number.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
 }
 
-/// Planners on a grid need to know where to put it.
-fn bound_missing(model: &Model) -> Option<String> {
-    let unbounded = model
-        .state
-        .iter()
-        .find(|variable| variable.bounds == Interval::ALL)?;
-    Some(format!(
-        "`{}` has no bounds to put a grid between; add `bounds` to [state]",
-        unbounded.name
-    ))
+/// What a planner found.
+pub struct Plan {
+    /// The policy.
+    pub policy: Found,
+    /// Return it expects from the start, where it knows.
+    pub value: Option<f64>,
+    /// Whether the planner's own test of convergence was passed.
+    pub converged: bool,
+    /// The horizon from which on the number of nodes no longer changes, where the planner has one (thesis 5.4).
+    pub policy_convergence_horizon: Option<usize>,
+    /// What is to be known of it: where it is not what it seems, and why.
+    pub remarks: Vec<String>,
 }
 
-fn too_many_variables(model: &Model) -> Option<String> {
-    let (n, most) = (model.state_dim(), mdp::MOST_VARIABLES);
-    (n > most).then(|| {
-        format!(
-            "it has {n} state variables, and a grid of true states is fine enough for {most} at most; use kbvi-closed or lqg"
-        )
-    })
+/// A policy as a planner has it.
+// There is one at a time, so its size does not matter.
+#[allow(clippy::large_enum_variant)]
+pub enum Found {
+    /// A rule that can be asked at every belief of a decision process.
+    Rule {
+        /// The rule.
+        policy: Box<dyn Policy>,
+        /// The decision process, whose levels its beliefs have.
+        mdp: BeliefMdp,
+    },
+    /// An automaton.
+    Automaton(Automaton),
+    /// A feedback on the mean that gives a free control.
+    Control(lqg::Controller),
+}
+
+impl Plan {
+    /// A rule for the beliefs of a decision process, which knows what it expects from the start if any does.
+    pub fn rule(policy: impl Policy + 'static, mdp: BeliefMdp) -> Self {
+        Self {
+            value: policy.value(mdp.start()),
+            ..Self::of(Found::Rule {
+                policy: Box::new(policy),
+                mdp,
+            })
+        }
+    }
+
+    /// An automaton, with what it says that it is worth.
+    pub fn automaton(automaton: Automaton) -> Self {
+        Self {
+            value: automaton.planned_value,
+            ..Self::of(Found::Automaton(automaton))
+        }
+    }
+
+    /// A policy of which nothing is known but that it was found.
+    pub fn of(policy: Found) -> Self {
+        Self {
+            policy,
+            value: None,
+            converged: true,
+            policy_convergence_horizon: None,
+            remarks: Vec::new(),
+        }
+    }
+}
+
+/// What a learner found.
+pub struct Lesson {
+    /// The automaton, in the form that was learned. It runs without seeing rewards.
+    pub automaton: Automaton,
+    /// Whether the learner's own test of convergence was passed.
+    pub converged: bool,
+    /// Steps of experience, trials included.
+    pub samples: u64,
+    /// How it came about.
+    pub learning: Learning,
+    /// What is to be known of it: where it is not what it seems, and why.
+    pub remarks: Vec<String>,
+}
+
+/// Refuses a model, with the reason and what would do.
+pub fn refuse(solver: &'static str, model: &Model, reason: impl Into<String>) -> Error {
+    Error::Unsupported {
+        solver,
+        model: model.name.clone(),
+        reason: reason.into(),
+    }
+}
+
+/// Refuses a model for the reason, if there is one.
+///
+/// # Errors
+/// [`Error::Unsupported`].
+pub fn refuse_if(solver: &'static str, model: &Model, reason: Option<String>) -> Result<()> {
+    reason.map_or(Ok(()), |reason| Err(refuse(solver, model, reason)))
 }

@@ -7,6 +7,7 @@ use pilotage::model::{
     StateVariable, Then,
 };
 use pilotage::scenario::{self, Scenario};
+use pilotage::solve::{Entry, Form, Request, Solver};
 
 /// A built-in model.
 pub fn built_in(name: &str) -> Model {
@@ -140,4 +141,47 @@ pub fn apart(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
 /// Least eigenvalue of a symmetric matrix.
 pub fn least_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
     matrix.clone().symmetric_eigenvalues().min()
+}
+
+/// A solver with settings small enough for a test of all of them; what is found need not be good.
+pub fn small(entry: &Entry, model: &Model) -> Solver {
+    let points = match model.state_dim() {
+        1 => "161",
+        2 => "25",
+        _ => "3",
+    };
+    let settings = [
+        ("points", points),
+        ("first_horizon", "1"),
+        ("last_horizon", "2"),
+        ("runs", "20"),
+        ("effort", "0.001"),
+        ("cells_along", "8"),
+        ("vigilances", "[0.5]"),
+        ("scout", "200"),
+        ("settle", "50"),
+        ("explore_limit", "1000"),
+        ("state_limit", "20"),
+        ("epoch", "500"),
+        ("epoch_per_cell", "1"),
+        ("epoch_per_entry", "1"),
+        ("epoch_limit", "2"),
+        ("trial", "10"),
+    ];
+    let known = entry.settings();
+    let has = |name: &str| known.iter().any(|info| info.name == name);
+    let settings: Vec<(String, String)> = settings
+        .iter()
+        .filter(|(name, _)| has(name))
+        .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()))
+        .collect();
+    entry.solver(&settings).unwrap()
+}
+
+/// What is asked of it.
+pub fn short(form: Form) -> Request {
+    Request {
+        runs: 20,
+        ..Request::form(form)
+    }
 }

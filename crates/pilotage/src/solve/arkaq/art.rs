@@ -13,7 +13,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::solve::learn::ensure;
+use crate::solve::settings::ensure;
 
 /// How inputs and centres are compared, and how centres learn.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::solve::learn::{Rates, SettingInfo, described, ensure, set};
+use crate::solve::learn::Rates;
+use crate::solve::settings::{self, ensure};
 
 /// Largest [`Settings::depth`].
 const MOST_DEPTH: usize = 16;
@@ -105,11 +106,6 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// All of them but the seed, which a run sets: by name, with defaults and what they mean.
-    pub fn described() -> Vec<SettingInfo> {
-        described::<Self>()
-    }
-
     /// ARKAQ with what the thesis left to be done (chapter 7): vigilance that tunes itself, states that merge, and Q(lambda); and with a
     /// memory that reaches farther back than one cluster.
     pub fn extended() -> Self {
@@ -138,21 +134,10 @@ impl Settings {
             floor: self.rate_floor,
         }
     }
+}
 
-    /// Sets one of them by name to a value written as in JSON. Ranges are left to [`Settings::validate`].
-    ///
-    /// # Errors
-    /// [`crate::Error::Unknown`] for a name that is none, [`crate::Error::Setting`] for a value of another kind than the setting's.
-    pub fn set(&mut self, name: &str, value: &str) -> Result<()> {
-        *self = set(self, name, value)?;
-        Ok(())
-    }
-
-    /// Checks every setting against its range.
-    ///
-    /// # Errors
-    /// [`crate::Error::Setting`] for the first that is out of range.
-    pub fn validate(&self) -> Result<()> {
+impl settings::Settings for Settings {
+    fn validate(&self) -> Result<()> {
         let open = |x: f64, low: f64, high: f64| low < x && x < high;
         let unit = |x: f64| (0.0..=1.0).contains(&x);
         let positive = |x: f64| x > 0.0 && x.is_finite();

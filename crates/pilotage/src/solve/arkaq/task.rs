@@ -5,21 +5,22 @@ use crate::belief::{BeliefMdp, Filter};
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::policy::Automaton;
+use crate::solve::Settings as _;
 use crate::solve::learn::{Trial, Worlds, known, run_trial};
 
 /// Name of the solver in errors and policies.
 pub(super) const SOLVER: &str = "arkaq";
 
 /// The learner's task.
-pub(super) struct Task<'a> {
+pub struct Task<'a> {
     /// What the agent assumes, without map, rewards, events and modes.
-    pub mdp: BeliefMdp,
+    pub(super) mdp: BeliefMdp,
     /// The filter before there are clusters.
-    pub filter: Filter,
-    pub settings: Settings,
-    pub worlds: &'a Worlds<'a>,
+    pub(super) filter: Filter,
+    pub(super) settings: Settings,
+    pub(super) worlds: &'a Worlds<'a>,
     /// Fingerprint of the whole problem.
-    pub fingerprint: u64,
+    pub(super) fingerprint: u64,
 }
 
 impl<'a> Task<'a> {

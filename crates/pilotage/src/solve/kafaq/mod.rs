@@ -22,8 +22,9 @@
 //! C. J. C. H. Watkins, *Learning from Delayed Rewards*, 1989 (Q-learning and Q(lambda)).
 
 mod axes;
-mod checkpoint;
 mod commit;
+mod course;
+mod curves;
 mod draft;
 mod edges;
 mod evidence;
@@ -34,39 +35,29 @@ mod regions;
 mod settings;
 mod steady;
 mod task;
+mod tested;
 mod tidy;
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-pub use crate::solve::learn::Worlds;
+pub use crate::solve::Worlds;
+pub use curves::drawn;
 pub use settings::{Rules, Settings};
 
 use crate::error::Result;
 use crate::model::{ActionId, Model};
 use crate::observe::Observer;
-use crate::policy::Automaton;
 use crate::scenario::Scenario;
-use crate::solve::learn::{Experience, Trial, critical, undiscounted};
+use crate::solve::learn::{self, Course};
+use crate::solve::solver::refuse_if;
+use crate::solve::{Learner, Lesson, Problem, refusals};
 use crate::world::{ProblemWorld, World};
-use draft::Draft;
-use memory::{Kind, Memory};
-use steady::Steady;
-use task::Task;
+use task::{SOLVER, Task};
 
 /// What a learning run found.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Learned {
-    /// The automaton. It runs without seeing rewards.
-    pub automaton: Automaton,
-    /// Whether its regions had stopped changing.
-    pub converged: bool,
-    /// Steps of experience, trials included.
-    pub samples: u64,
-    /// How it came about.
-    pub learning: Learning,
-}
+pub type Learned = learn::Learned<Learning>;
 
 /// How learning went.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,23 +98,23 @@ pub struct RegionValue {
     pub value: f64,
 }
 
-/// Whether a model can be learned with these settings.
+/// The learner with its task: `model` tells it no more than the agent knows of itself, and it acts in the worlds that `worlds` makes.
 ///
 /// # Errors
-/// [`crate::Error::Setting`] and [`crate::Error::Unsupported`], as [`learn`].
-pub fn accepts(model: &Model, settings: &Settings) -> Result<()> {
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&Scenario::assumed(model))) };
-    Task::new(model, settings.clone(), &worlds).map(drop)
+/// [`crate::Error::Setting`] for settings out of range, [`crate::Error::Unsupported`] for a model without bounds, noise or
+/// one chain of levels.
+pub fn course<'a>(
+    model: &Model,
+    worlds: &'a Worlds<'a>,
+    settings: &Settings,
+) -> Result<impl Course<Learning = Learning> + use<'a>> {
+    Task::new(model, settings.clone(), worlds)
 }
 
-/// Learns an automaton in the worlds that `worlds` makes, of which `model` tells no more than the agent knows of itself.
-///
-/// With a checkpoint file the run writes its state there after every epoch, and goes on from there if the file exists: stopped and
-/// resumed, it ends with the same result as if never stopped. The printed rules take seconds and write none.
+/// Learns an automaton, see [`course`] and [`crate::solve::run_course`].
 ///
 /// # Errors
-/// [`crate::Error::Setting`] for settings out of range, [`crate::Error::Unsupported`] for a model without bounds, noise or one chain of levels,
-/// [`crate::Error::Checkpoint`] for a checkpoint of another run or a damaged one, [`crate::Error::Io`] where it cannot be read or written.
+/// As [`course`] and [`crate::solve::run_course`].
 pub fn learn(
     model: &Model,
     worlds: &Worlds<'_>,
@@ -131,245 +122,39 @@ pub fn learn(
     checkpoint: Option<&Path>,
     observer: &dyn Observer,
 ) -> Result<Learned> {
-    if settings.rules == Rules::Printed {
-        return Ok(printed::learn(
-            &Task::new(model, settings.clone(), worlds)?,
-            observer,
-        ));
-    }
-    let mut run = match checkpoint.filter(|path| path.exists()) {
-        Some(path) => Run::resume(model, worlds, settings, path)?,
-        None => {
-            let run = Run::new(model, worlds, settings)?;
-            // A file that cannot be written is known before work is done that it should keep.
-            checkpoint.map_or(Ok(()), |path| run.save(path))?;
-            run
-        }
-    };
-    while !run.finished() {
-        run.advance(observer);
-        if let Some(path) = checkpoint {
-            run.save(path)?;
-        }
-    }
-    Ok(run.learned())
+    learn::learn(course(model, worlds, settings)?, checkpoint, observer)
 }
 
-/// A learning run that can be watched, stopped and resumed.
-pub struct Run<'a> {
-    task: Task<'a>,
-    state: State,
-}
+impl Learner for Settings {
+    fn name(&self) -> &'static str {
+        SOLVER
+    }
 
-/// All that a run has to remember between two calls of [`Run::advance`].
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct State {
-    experience: Experience,
-    curve: Vec<Point>,
-    /// Memories tried so far.
-    tried: usize,
-    /// What is being learned; nothing once the run is over.
-    learning: Option<Steady>,
-    best: Option<Best>,
-}
+    fn accepts(&self, model: &Model) -> Result<()> {
+        refuse_if(SOLVER, model, refusals::reward_missing(model))?;
+        let worlds =
+            || -> Box<dyn World> { Box::new(ProblemWorld::new(&Scenario::assumed(model))) };
+        course(model, &worlds, self).map(drop)
+    }
 
-/// The best automaton so far and what it was made of.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-struct Best {
-    /// Number of its memory.
-    memory: usize,
-    draft: Draft,
-    steady: Steady,
-    converged: bool,
-}
-
-impl<'a> Run<'a> {
-    /// A run that has not begun.
-    ///
-    /// # Errors
-    /// As [`learn`].
-    pub fn new(model: &Model, worlds: &'a Worlds<'a>, settings: &Settings) -> Result<Self> {
-        let task = Task::new(model, settings.clone(), worlds)?;
-        let state = State {
-            experience: Experience::default(),
-            curve: Vec::new(),
-            tried: 0,
-            learning: Some(Steady::new(&task, Memory::none())),
-            best: None,
+    fn learn(
+        &self,
+        problem: &Problem,
+        worlds: &Worlds<'_>,
+        checkpoint: Option<&Path>,
+        observer: &dyn Observer,
+    ) -> Result<Lesson> {
+        let settings = Self {
+            seed: problem.seed(),
+            ..self.clone()
         };
-        Ok(Self { task, state })
-    }
-
-    /// Whether there is nothing more to learn.
-    pub fn finished(&self) -> bool {
-        self.state.learning.is_none()
-    }
-
-    /// Does one piece of work: an epoch, and what follows from it where it was the last of a memory.
-    pub fn advance(&mut self, observer: &dyn Observer) {
-        let Some(mut steady) = self.state.learning.take() else {
-            return;
-        };
-        let limit = self.task.settings.epoch_limit as u64;
-        observer.progress("epochs", steady.epochs() as u64, limit);
-        let earned = steady.run_epoch(&self.task, &mut self.state.experience);
-        self.state
-            .curve
-            .push(self.point(&steady, earned.reward / earned.steps as f64));
-        observer.progress("epochs", steady.epochs() as u64, limit);
-        let regions: usize = steady.regions.iter().map(Vec::len).sum();
-        observer.status(&format!(
-            "{} steps, {:.3} a step, {regions} nodes",
-            self.state.experience.samples,
-            earned.reward / earned.steps as f64
-        ));
-        self.state.learning = if steady.finished(&self.task) {
-            self.conclude(steady, observer);
-            self.next_memory()
-        } else {
-            Some(steady)
-        };
-        if self.state.learning.is_none() {
-            self.commit(observer);
-        }
-    }
-
-    /// Makes the automaton of a memory and keeps it if it earns surely more than the best so far.
-    fn conclude(&mut self, steady: Steady, observer: &dyn Observer) {
-        let (draft, trial, steps) = edges::compile(&self.task, &steady);
-        let (draft, trial, more_steps) = tidy::tidy(&self.task, &steady, draft, trial);
-        self.state.experience.samples += steps + more_steps;
-        let adopted = match &self.state.best {
-            None => true,
-            Some(best) => {
-                let other = self.trial(&best.draft);
-                self.state.experience.samples += other.steps();
-                trial.excess(&other, undiscounted) > critical(self.task.settings.adopt_error)
-            }
-        };
-        observer.note(&format!(
-            "{}: {:.3} an episode with {} nodes, {}",
-            draft.memory.describe(&self.action_names()),
-            trial.mean(undiscounted),
-            draft.nodes.len(),
-            if adopted { "adopted" } else { "not adopted" }
-        ));
-        if adopted {
-            let converged = steady.converged(&self.task);
-            self.state.best = Some(Best {
-                memory: self.state.tried,
-                draft,
-                steady,
-                converged,
-            });
-        }
-        self.state.tried += 1;
-    }
-
-    /// The next memory worth trying. One needs events at two places; a count of an action is only tried for actions that the agent
-    /// believes do not move it, for any other shows in its belief.
-    fn next_memory(&self) -> Option<Steady> {
-        let (task, experience) = (&self.task, &self.state.experience);
-        // Edges are boxes of state variables.
-        if task.coordinates.is_some() {
-            return None;
-        }
-        let threshold = task.settings.notable * experience.rewards.1;
-        let notable = experience
-            .events
-            .iter()
-            .filter(|event| event.0 >= threshold);
-        let means: Vec<&[f64]> = notable.map(|event| event.1.as_slice()).collect();
-        let unit = task.deviations();
-        let places = memory::places(&means, task.settings.place, &unit);
-        if places.len() < 2 {
-            return None;
-        }
-        let model = task.mdp.model();
-        let still = (0..task.actions()).filter(|&action| model.displacement(action).amax() == 0.0);
-        let mut kinds = std::iter::once(Kind::Place).chain(still.map(Kind::PlaceAndParity));
-        let kind = kinds.nth(self.state.tried.checked_sub(1)?)?;
-        Some(Steady::new(
-            task,
-            Memory::of_events(kind, places, threshold, unit),
-        ))
-    }
-
-    /// Learns the less certain levels of the best automaton.
-    fn commit(&mut self, observer: &dyn Observer) {
-        let Some(best) = &mut self.state.best else {
-            return;
-        };
-        let experience = &mut self.state.experience;
-        let own = commit::segment_less_certain_levels(
-            &self.task,
-            experience,
-            &best.steady,
-            &mut best.draft,
-        );
-        if !own.is_empty() {
-            observer.note(&format!("levels with regions of their own: {own:?}"));
-        }
-    }
-
-    fn trial(&self, draft: &Draft) -> Trial {
-        self.task.trial(&draft.compile(&self.task))
-    }
-
-    fn action_names(&self) -> Vec<String> {
-        let actions = self.task.mdp.model().actions.iter();
-        actions.map(|action| action.name.clone()).collect()
-    }
-
-    fn point(&self, steady: &Steady, reward: f64) -> Point {
-        let by_memory = steady.regions.iter().enumerate();
-        let regions = by_memory.flat_map(|(memory, regions)| {
-            regions.iter().map(move |region| {
-                let (lower, upper) = self.task.lattice.corners(&region.cells);
-                RegionValue {
-                    memory,
-                    lower,
-                    upper,
-                    action: region.action,
-                    value: steady.region_value(&self.task, memory, region),
-                }
-            })
-        });
-        Point {
-            memory: self.state.tried,
-            samples: self.state.experience.samples,
-            reward,
-            regions: regions.collect(),
-        }
-    }
-
-    /// What was learned so far; before the first memory is learned, what its regions say.
-    pub fn learned(&self) -> Learned {
-        let State {
-            best,
-            learning,
-            experience,
-            curve,
-            tried,
-        } = &self.state;
-        let unfinished = || {
-            let steady = learning
-                .clone()
-                .unwrap_or_else(|| Steady::new(&self.task, Memory::none()));
-            edges::compile(&self.task, &steady).0
-        };
-        let draft = best
-            .as_ref()
-            .map_or_else(unfinished, |best| best.draft.clone());
-        Learned {
-            automaton: draft.compile(&self.task),
-            converged: best.as_ref().is_some_and(|best| best.converged),
-            samples: experience.samples,
-            learning: Learning {
-                memory: draft.memory.describe(&self.action_names()),
-                adopted: best.as_ref().map_or(*tried, |best| best.memory),
-                curve: curve.clone(),
-            },
-        }
+        let learned = learn(problem.model(), worlds, &settings, checkpoint, observer)?;
+        Ok(Lesson {
+            learning: curves::drawn(&learned.automaton, &learned.learning),
+            automaton: learned.automaton,
+            converged: learned.converged,
+            samples: learned.samples,
+            remarks: Vec::new(),
+        })
     }
 }

@@ -7,6 +7,10 @@
 //! the current one, outside all the nearest; a new region inherits the values of the one it is made from; learning ends when the
 //! number of regions has not changed for [`CALM`] steps, or at [`Settings::printed_limit`].
 
+use std::ops::ControlFlow;
+
+use serde::{Deserialize, Serialize};
+
 use super::settings::Settings;
 use super::task::{SOLVER, Task};
 use super::{Learned, Learning, Point, RegionValue};
@@ -20,6 +24,7 @@ const CALM: u64 = 1_000;
 /// Half-width of the first region, in standard deviations of the start belief.
 const START_WIDTH: f64 = 2.5;
 
+#[derive(Debug, Serialize, Deserialize)]
 struct Region {
     place: Place,
     values: Vec<f64>,
@@ -61,83 +66,119 @@ impl Region {
     }
 }
 
-/// SegmentSteadyLevel by the printed rules.
-pub(super) fn learn(task: &Task<'_>, observer: &dyn Observer) -> Learned {
-    let settings = &task.settings;
-    let mut experience = Experience::default();
-    let mut regions = vec![first_region(task)];
-    let deviations = task.deviations();
-    let half: Vec<f64> = deviations
-        .iter()
-        .map(|d| settings.printed_width * d)
-        .collect();
-    let mut temperature = settings.hot;
-    let mut curve = Vec::new();
-    let mut actor = task.actor();
-    let (step_limit, region_limit) = settings.printed_limit;
-    let (mut calm, mut reward) = (0, 0.0);
-    let over = |experience: &Experience, calm: u64, regions: &[Region]| {
-        calm >= CALM || experience.samples >= step_limit as u64 || regions.len() >= region_limit
-    };
-    observer.progress("steps", 0, step_limit as u64);
-    while !over(&experience, calm, &regions) {
-        let (mut draws, mut exploration) = experience.next_episode(task.settings.seed);
+/// All that a run has to remember between two episodes.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct State {
+    experience: Experience,
+    regions: Vec<Region>,
+    temperature: f64,
+    curve: Vec<Point>,
+    /// Steps without a new region.
+    calm: u64,
+    /// Sum since the last point of the curve.
+    reward: f64,
+}
+
+impl State {
+    pub fn new(task: &Task<'_>) -> Self {
+        Self {
+            experience: Experience::default(),
+            regions: vec![first_region(task)],
+            temperature: task.settings.hot,
+            curve: Vec::new(),
+            calm: 0,
+            reward: 0.0,
+        }
+    }
+
+    fn is_over(&self, task: &Task<'_>) -> bool {
+        let (step_limit, region_limit) = task.settings.printed_limit;
+        self.calm >= CALM
+            || self.experience.samples >= step_limit as u64
+            || self.regions.len() >= region_limit
+    }
+
+    /// SegmentSteadyLevel by the printed rules: an episode.
+    pub fn advance(&mut self, task: &Task<'_>, observer: &dyn Observer) -> ControlFlow<()> {
+        if self.is_over(task) {
+            return ControlFlow::Break(());
+        }
+        let settings = &task.settings;
+        let step_limit = settings.printed_limit.0 as u64;
+        observer.progress("steps", self.experience.samples, step_limit);
+        let half: Vec<f64> = task
+            .deviations()
+            .iter()
+            .map(|d| settings.printed_width * d)
+            .collect();
+        let mut actor = task.actor();
+        let (mut draws, mut exploration) = self.experience.next_episode(settings.seed);
         actor.reset(&mut draws);
         let mut previous: Option<(usize, ActionId, f64)> = None;
         for _ in 0..task.mdp.model().episode.length {
-            if over(&experience, calm, &regions) {
+            if self.is_over(task) {
                 break;
             }
+            let regions = &mut self.regions;
             let mean = actor.belief.mean.clone();
-            let current = find_current_segment(&regions, &mean);
+            let current = find_current_segment(regions, &mean);
             if let Some((before, action, reward)) = previous {
                 let next = regions[current].values[regions[current].best()];
                 let target = reward + task.discount() * next;
                 td_update(settings, &mut regions[before], action, target);
             }
-            let heat = temperature * experience.reward_range();
+            let heat = self.temperature * self.experience.reward_range();
             let values = &regions[current].values;
             let action = boltzmann(values, heat, settings.explore, &mut exploration);
             let mut acting = current;
             if action == regions[current].best() {
                 regions[current].extend(&mean);
-                calm += 1;
+                self.calm += 1;
             } else {
                 // GenerateNewRegion outside all regions, SplitRegion inside: the figure does the same in both.
                 regions.push(Region::around(&mean, &half, values.clone()));
                 acting = regions.len() - 1;
-                calm = 0;
+                self.calm = 0;
             }
             let at_steady = actor.belief.level == task.steady();
             let step = actor.step(action, &mut draws);
-            experience.collect(step.reward);
-            reward += step.reward;
+            self.experience.collect(step.reward);
+            self.reward += step.reward;
             if step.then == Then::End {
                 td_update(settings, &mut regions[acting], action, step.reward);
                 break;
             }
             previous = at_steady.then_some((acting, action, step.reward));
-            if experience.samples % settings.epoch as u64 == 0 {
-                temperature = (temperature * settings.cooling).max(settings.cold);
-                curve.push(point(
-                    &regions,
-                    experience.samples,
-                    reward / settings.epoch as f64,
-                ));
-                reward = 0.0;
-                observer.progress("steps", experience.samples, step_limit as u64);
+            if self
+                .experience
+                .samples
+                .is_multiple_of(settings.epoch as u64)
+            {
+                self.temperature = (self.temperature * settings.cooling).max(settings.cold);
+                let reward = self.reward / settings.epoch as f64;
+                self.curve
+                    .push(point(regions, self.experience.samples, reward));
+                self.reward = 0.0;
+                observer.progress("steps", self.experience.samples, step_limit);
             }
         }
+        match self.is_over(task) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
     }
-    Learned {
-        automaton: compile(task, &regions),
-        converged: calm >= CALM,
-        samples: experience.samples,
-        learning: Learning {
-            memory: "no memory".to_owned(),
-            adopted: 0,
-            curve,
-        },
+
+    pub fn learned(&self, task: &Task<'_>) -> Learned {
+        Learned {
+            automaton: compile(task, &self.regions),
+            converged: self.calm >= CALM,
+            samples: self.experience.samples,
+            learning: Learning {
+                memory: "no memory".to_owned(),
+                adopted: 0,
+                curve: self.curve.clone(),
+            },
+        }
     }
 }
 

@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::solve::learn::{Rates, SettingInfo, described, ensure, set};
+use crate::solve::learn::Rates;
+use crate::solve::settings::{self, ensure};
 
 /// How regions change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -125,20 +126,6 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// All of them but the seed, which a run sets: by name, with defaults and what they mean.
-    pub fn described() -> Vec<SettingInfo> {
-        described::<Self>()
-    }
-
-    /// Sets one of them by name to a value written as in JSON; words need no quotes. Ranges are left to [`Settings::validate`].
-    ///
-    /// # Errors
-    /// [`crate::Error::Unknown`] for a name that is none, [`crate::Error::Setting`] for a value of another kind than the setting's.
-    pub fn set(&mut self, name: &str, value: &str) -> Result<()> {
-        *self = set(self, name, value)?;
-        Ok(())
-    }
-
     /// How fast values are learned.
     pub(super) fn rates(&self) -> Rates {
         Rates {
@@ -147,12 +134,10 @@ impl Settings {
             floor: self.rate_floor,
         }
     }
+}
 
-    /// Checks every setting against its range.
-    ///
-    /// # Errors
-    /// [`crate::Error::Setting`] for the first that is out of range.
-    pub fn validate(&self) -> Result<()> {
+impl settings::Settings for Settings {
+    fn validate(&self) -> Result<()> {
         let open = |x: f64, low: f64, high: f64| low < x && x < high;
         let error_rate = "more than 0 and less than 0.5, such as 0.001";
         let reals = [

@@ -7,25 +7,26 @@ use crate::belief::{BeliefMdp, Filter, LevelId};
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::policy::{Automaton, Coordinates, MOST_COORDINATES};
+use crate::solve::Settings as _;
 use crate::solve::learn::{Actor, Trial, Worlds, known, run_trial};
 
 /// Name of the solver in errors and policies.
 pub(super) const SOLVER: &str = "kafaq";
 
 /// The learner's task.
-pub(super) struct Task<'a> {
+pub struct Task<'a> {
     /// What the agent assumes, without map, rewards, events and modes.
-    pub mdp: BeliefMdp,
-    pub settings: Settings,
-    pub worlds: &'a Worlds<'a>,
+    pub(super) mdp: BeliefMdp,
+    pub(super) settings: Settings,
+    pub(super) worlds: &'a Worlds<'a>,
     /// What the lattice is laid along; `None` for the state variables.
-    pub coordinates: Option<Coordinates>,
-    pub lattice: Lattice,
-    pub filter: Filter,
+    pub(super) coordinates: Option<Coordinates>,
+    pub(super) lattice: Lattice,
+    pub(super) filter: Filter,
     /// Levels from the start to the steady one.
-    pub chain: Vec<LevelId>,
+    pub(super) chain: Vec<LevelId>,
     /// Fingerprint of the whole problem.
-    pub fingerprint: u64,
+    pub(super) fingerprint: u64,
 }
 
 impl<'a> Task<'a> {
@@ -138,7 +139,7 @@ fn chain(mdp: &BeliefMdp) -> std::result::Result<Vec<LevelId>, String> {
     let levels = mdp.levels();
     if levels.classes().len() > 1 {
         return Err("its actions disturb motion or sensor in different ways, so that uncertainty has no one order of levels to be learned in; \
-                    use kbvi-closed"
+                    use value-iteration"
             .to_owned());
     }
     let start = mdp.start().level;

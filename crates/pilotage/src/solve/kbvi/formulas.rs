@@ -2,6 +2,8 @@
 //! at a belief (5.1), distribution of the next beliefs (5.2), expected reward over that distribution (5.3).
 
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::belief::gaussian::{gauss_hermite, normal_cdf, normal_density, region_probability};
 use crate::belief::kalman::square_root;
@@ -9,18 +11,22 @@ use crate::belief::{BeliefMdp, ClassId, LevelId};
 use crate::model::{ActionId, Interval, ModeId, Region};
 
 /// Which formulas to use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Formulas {
-    /// Expected reward at a belief.
+    /// Expected reward at a belief: `exact` or `ramp`, the thesis' lines.
+    #[serde(rename = "reward_formula")]
     pub reward: RewardFormula,
-    /// Spread of the next beliefs.
+    /// Spread of the next beliefs: `exact` or `printed`, as in Eq. 5.4 and 5.6.
+    #[serde(rename = "spread_formula")]
     pub spread: SpreadFormula,
-    /// Integral of a line against a Gaussian; only the ramp needs it.
+    /// Integral of a line against a Gaussian, which only the ramp needs: `exact` or `printed`, as in Eq. 5.14.
+    #[serde(rename = "integral_formula")]
     pub integral: IntegralFormula,
 }
 
 /// Expected reward at a belief (5.1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum RewardFormula {
     /// Exact differences of the normal cdf (Eq. 5.2).
     #[default]
@@ -30,7 +36,8 @@ pub enum RewardFormula {
 }
 
 /// Covariance of the mean one step on (5.2).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum SpreadFormula {
     /// `A V A' + K S K'`: what the mean really does.
     #[default]
@@ -40,7 +47,8 @@ pub enum SpreadFormula {
 }
 
 /// Integral of a line against a Gaussian (Eq. 5.14).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum IntegralFormula {
     /// `-a sqrt(V / 2 pi) exp(..) + (b + a E) Phi(..)`.
     #[default]

@@ -12,7 +12,6 @@ use crate::parallel;
 use crate::policy::{Automaton, Matching, Policy, first_best};
 use crate::scenario::Scenario;
 use crate::simulate::{FilterAgent, run_episode};
-use crate::solve::SolverKind;
 use crate::solve::compile::annotate;
 use crate::world::{Draws, ProblemWorld};
 
@@ -93,10 +92,10 @@ pub fn generate(
             });
         }
     }
-    SolverKind::Kbvi.accepts(mdp.model())?;
+    super::accepts(mdp.model())?;
     let planner = Branches::new(mdp.clone(), settings.search);
     let mut history: Vec<(usize, usize)> = Vec::new();
-    let mut automaton = Automaton::new(mdp, "kbvi", settings.matching);
+    let mut automaton = Automaton::new(mdp, super::SOLVER, settings.matching);
     let total = (settings.last_horizon - first + 1) as u64;
     observer.progress("horizons", 0, total);
     for horizon in first..=settings.last_horizon {
@@ -126,7 +125,7 @@ fn settled(history: &[(usize, usize)], repeats: usize) -> bool {
 }
 
 fn at_horizon(planner: &Branches, settings: &Settings) -> Automaton {
-    let mut automaton = Automaton::new(planner.mdp(), "kbvi", settings.matching);
+    let mut automaton = Automaton::new(planner.mdp(), super::SOLVER, settings.matching);
     let runs = parallel::map(settings.runs, |run| run_once(planner, settings, run as u64));
     for (belief, action, value) in runs.into_iter().flatten() {
         automaton.learn(&belief, action, value);

@@ -29,10 +29,13 @@ struct Header<S> {
 
 /// Whose run a checkpoint is.
 pub struct Owner<'a, S> {
+    /// Name of the learner.
     pub solver: &'static str,
+    /// Name of the problem.
     pub problem: &'a str,
     /// Fingerprint of the problem.
     pub fingerprint: u64,
+    /// Settings of the learner, its seed among them.
     pub settings: &'a S,
 }
 

@@ -16,10 +16,81 @@ pub use control::Controller;
 pub use nearest::{NearestAction, Weights};
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use super::Form;
+use super::settings::{Settings, ensure};
+use super::solver::{Found, Plan, Planner, Problem, refuse_if};
 use crate::belief::kalman::symmetric;
 use crate::error::{Error, Result};
 use crate::model::{Interval, Model};
+use crate::observe::Observer;
+
+/// Name of the solver in errors and policies.
+const SOLVER: &str = "lqg";
+
+/// The linear-quadratic-Gaussian controller.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Lqg {
+    /// What deviations cost, where an action is chosen. A free control always has the model's own cost.
+    #[serde(flatten)]
+    pub weights: Weights,
+}
+
+impl Settings for Lqg {
+    fn validate(&self) -> Result<()> {
+        for (setting, weights, least) in [
+            ("state_weights", &self.weights.state, 0.0),
+            ("control_weights", &self.weights.control, f64::MIN_POSITIVE),
+        ] {
+            let weights = weights.as_deref().unwrap_or_default();
+            let fits = |weight: &f64| weight.is_finite() && *weight >= least;
+            let range = nearest::WEIGHTS;
+            ensure(
+                setting,
+                format!("{weights:?}"),
+                weights.iter().all(fits),
+                range,
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl Planner for Lqg {
+    fn name(&self) -> &'static str {
+        SOLVER
+    }
+
+    fn accepts(&self, model: &Model) -> Result<()> {
+        refuse_if(SOLVER, model, use_of(model).err())
+    }
+
+    fn plan(&self, problem: &Problem, _: &dyn Observer) -> Result<Plan> {
+        if !self.makes_automaton(problem.model()) {
+            let controller = Controller::new(problem.mdp())?;
+            return Ok(Plan {
+                value: Some(controller.planned_value()),
+                ..Plan::of(Found::Control(controller))
+            });
+        }
+        let policy = NearestAction::new(problem.model(), &self.weights)?;
+        // Two nodes say it exactly where there are two actions.
+        let nodes = match problem.form() {
+            Form::Nearest => policy.automaton(problem.mdp()),
+            Form::Segments | Form::Grid => None,
+        };
+        Ok(match nodes {
+            Some(automaton) => Plan::automaton(automaton),
+            None => Plan::rule(policy, problem.mdp().clone()),
+        })
+    }
+
+    fn makes_automaton(&self, model: &Model) -> bool {
+        use_of(model) != Ok(Use::Control)
+    }
+}
 
 /// Which of its two uses a model is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

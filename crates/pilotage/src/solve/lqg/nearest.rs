@@ -1,6 +1,8 @@
 //! The controller as a baseline for models with a list of actions: the one nearest to the command.
 
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::belief::{Belief, BeliefMdp};
 use crate::error::{Error, Result};
@@ -9,13 +11,21 @@ use crate::policy::{Automaton, Matching, Node, Place, Policy};
 use crate::solve::lqr::lqr_gain;
 
 /// What deviations cost, variable by variable: `x' diag(state) x + u' diag(control) u`.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Weights {
-    /// Weight of each state variable, at least 0; `None` for the model's own.
+    /// What a deviation of each state variable costs, such as `[1.0, 0.0]`; each at least 0, or `auto` for the model's own cost, or else
+    /// 1 at each limit.
+    #[serde(rename = "state_weights")]
     pub state: Option<Vec<f64>>,
-    /// Weight of each control, above 0; `None` for the model's own.
+    /// What each control costs, such as `[0.1]`; each more than 0, or `auto` for the model's own cost, or else 1 at the largest of an
+    /// action.
+    #[serde(rename = "control_weights")]
     pub control: Option<Vec<f64>>,
 }
+
+/// What weights have to be.
+pub(super) const WEIGHTS: &str =
+    "one finite number for each variable or control, none negative, those of controls above 0";
 
 /// The action whose control is nearest to `u = -L m`, ties to the first.
 #[derive(Debug, Clone)]
@@ -34,14 +44,14 @@ impl NearestAction {
     /// [`Error::Setting`] for weights out of range, [`Error::NoSteadyState`] where no gain holds every direction that costs.
     pub fn new(model: &Model, weights: &Weights) -> Result<Self> {
         let state = match (&weights.state, &model.cost) {
-            (Some(weights), _) => diagonal("state weights", weights, model.state_dim(), 0.0)?,
+            (Some(weights), _) => diagonal("state_weights", weights, model.state_dim(), 0.0)?,
             (None, Some(cost)) => cost.state.clone(),
             (None, None) => bryson_state(model),
         };
         let control = match (&weights.control, &model.cost) {
             (Some(weights), _) => {
                 let controls = model.motion.b.ncols();
-                diagonal("control weights", weights, controls, f64::MIN_POSITIVE)?
+                diagonal("control_weights", weights, controls, f64::MIN_POSITIVE)?
             }
             (None, Some(cost)) => cost.control.clone(),
             (None, None) => bryson_control(model),
@@ -81,7 +91,7 @@ impl NearestAction {
         }
         let foot = &normal * (offset / square);
         let aside = &normal / square.sqrt();
-        let mut automaton = Automaton::new(mdp, "lqg", Matching::Nearest);
+        let mut automaton = Automaton::new(mdp, super::SOLVER, Matching::Nearest);
         for (point, action) in [(&foot - &aside, *first), (&foot + &aside, *second)] {
             let place = Place::Point(point.as_slice().to_vec());
             let levels = 0..=mdp.levels().len() - 1;
@@ -133,7 +143,7 @@ fn diagonal(
         return Err(Error::Setting {
             setting,
             value: format!("{weights:?}"),
-            range: "one finite number for each variable or control, none negative, those of controls above 0",
+            range: WEIGHTS,
         });
     }
     Ok(DMatrix::from_diagonal(&DVector::from_column_slice(weights)))

@@ -1,10 +1,10 @@
-//! Where the grid of closed-loop KBVI lies, how fine it is and how much memory it takes.
+//! Where the grid of value iteration lies, how fine it is and how much memory it takes.
 
-use super::closed::Settings;
+use super::SOLVER;
 use crate::belief::{BeliefMdp, LevelId};
 use crate::error::{Error, Result};
 use crate::model::{Map, Model, Region, WallBelief};
-use crate::solve::grid::Axis;
+use crate::solve::grid::{Axis, Settings};
 use crate::solve::walled::WalledSmoother;
 
 /// The grid covers the bounds and as far beyond as the mean can stray. Where the belief knows of walls it ends at them. Along a variable
@@ -22,14 +22,7 @@ pub(super) fn axes(mdp: &BeliefMdp, settings: &Settings) -> Result<Vec<Axis>> {
         (None, 2) if knows_map(mdp) => points_of_map(model),
         (None, 2) => 241,
         (None, 3) => 61,
-        (None, _) => {
-            return Err(unsupported(
-                model,
-                format!(
-                    "a grid in {n} variables is too coarse to be right; state the problem in at most 3, add failure limits (`alive` in [episode]), which are planned for without a grid, or set the points of the grid (--grid)"
-                ),
-            ));
-        }
+        (None, _) => return Err(unsupported(model, too_many_variables(n))),
     };
     let axes: Vec<Axis> = (0..n).map(|variable| axis(mdp, variable, points)).collect();
     within_reach(model, &axes)?;
@@ -61,9 +54,19 @@ pub(super) fn axes(mdp: &BeliefMdp, settings: &Settings) -> Result<Vec<Axis>> {
     Ok(axes)
 }
 
+/// Most variables in which a grid is fine enough unless it is said how fine it shall be.
+pub(super) const MOST_VARIABLES: usize = 3;
+
+/// Why a grid in so many variables is refused, and what would do.
+pub(super) fn too_many_variables(n: usize) -> String {
+    format!(
+        "a grid in {n} variables is too coarse to be right; use policy-search, which needs none, state the problem in at most {MOST_VARIABLES}, or set the points of the grid (--grid)"
+    )
+}
+
 fn unsupported(model: &Model, reason: String) -> Error {
     Error::Unsupported {
-        solver: "kbvi-closed",
+        solver: SOLVER,
         model: model.name.clone(),
         reason,
     }

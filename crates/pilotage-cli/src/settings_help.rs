@@ -1,25 +1,23 @@
-//! The learners' settings, as `pilotage solve --help` lists them.
+//! The settings of every solver, as `pilotage solve --help` lists them.
 
 use comfy_table::presets;
 use comfy_table::{ContentArrangement, Table};
-use pilotage::solve::{SettingInfo, arkaq, kafaq};
+use pilotage::solve::{Registry, SettingInfo};
 
 /// Columns of the page, as of the rest of the help.
 const WIDTH: u16 = 100;
 
-/// Every learner's settings: name, default, meaning and range.
-pub fn learner_settings() -> String {
-    let learners = [
-        ("kafaq", kafaq::Settings::described()),
-        ("arkaq", arkaq::Settings::described()),
-    ];
-    let lists = learners.map(|(learner, settings)| {
+/// Every solver's settings: name, default, meaning and range.
+pub fn settings_of_solvers() -> String {
+    let registry = Registry::builtin();
+    let lists = registry.entries().iter().map(|entry| {
         format!(
-            "Settings of {learner}, for --learn NAME=VALUE:\n{}",
-            table(settings)
+            "Settings of {}, for --set NAME=VALUE:\n{}",
+            entry.name(),
+            table(entry.settings())
         )
     });
-    lists.join("\n\n")
+    lists.collect::<Vec<_>>().join("\n\n")
 }
 
 fn table(settings: Vec<SettingInfo>) -> String {

@@ -1,7 +1,6 @@
-//! Closed-loop KBVI: value iteration on beliefs `(mode, level, mean)`.
+//! The value of beliefs `(mode, level, mean)` on a grid of means.
 //!
-//! The thesis' branches (5.3) fix a sequence of actions in advance, so to them sensing is worth nothing. Here the agent is free to
-//! choose again after every observation:
+//! With an agent that is free to choose again after every observation,
 //!
 //! ```text
 //! Q(b, a) = r(b, a) + discount * E V(b'),   m' = A m + B u + K nu,  nu ~ N(0, S)
@@ -25,8 +24,7 @@ use crate::error::{Error, Result};
 use crate::model::{ActionId, Then};
 use crate::observe::Observer;
 use crate::policy::Policy;
-pub use crate::solve::grid::Settings;
-use crate::solve::grid::{Axis, Grid, Interpolation, Smoother};
+use crate::solve::grid::{Axis, Grid, Interpolation, Settings, Smoother};
 use crate::solve::rollout;
 use crate::solve::walled::WalledSmoother;
 
@@ -57,7 +55,7 @@ pub struct GridPolicy {
 /// [`Error::TooLarge`] where the grid does not fit the memory allowed, [`Error::Setting`] for settings out of range,
 /// [`Error::Unsupported`] where the grid does not see what is paid, [`Error::NotFinite`] where numbers grow beyond all bounds.
 pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> Result<GridPolicy> {
-    check(settings)?;
+    settings.validate()?;
     let mut policy = super::horizon::plan(mdp, settings, observer)?;
     if let Some(remark) = policy.strays() {
         policy.remarks.push(remark);
@@ -87,31 +85,6 @@ pub(super) fn iterate(
         observer.progress("levels", done as u64 + 1, groups.len() as u64);
     }
     Ok(policy)
-}
-
-fn check(settings: &Settings) -> Result<()> {
-    if let Some(points) = settings.points.filter(|points| *points < 2) {
-        return Err(Error::Setting {
-            setting: "points",
-            value: points.to_string(),
-            range: "at least 2",
-        });
-    }
-    if settings.tolerance.is_nan() || settings.tolerance <= 0.0 {
-        return Err(Error::Setting {
-            setting: "tolerance",
-            value: settings.tolerance.to_string(),
-            range: "above 0",
-        });
-    }
-    if settings.sweeps == 0 {
-        return Err(Error::Setting {
-            setting: "sweeps",
-            value: "0".to_owned(),
-            range: "at least 1",
-        });
-    }
-    Ok(())
 }
 
 /// Levels that lead back to each other, in an order such that every group only leads to itself and those before it.

@@ -5,7 +5,7 @@
 //! difference matters, the plan is made anew with levels that tell the time, so that it may do something else near the end; if not, the
 //! actions stay as they are and only the promise is that of the episode.
 
-use super::closed::{Average, Backup, GridPolicy, iterate};
+use super::grid_policy::{Average, Backup, GridPolicy, iterate};
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
 use crate::observe::Observer;

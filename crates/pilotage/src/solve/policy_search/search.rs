@@ -1,4 +1,4 @@
-//! Closed-loop KBVI with a quadratic value, for models with failure limits and too many variables for a grid.
+//! The search for switching planes.
 //!
 //! The aim is to stay within the limits, and the rewards of the model are not looked at. Three steps:
 //!
@@ -10,45 +10,18 @@
 
 use nalgebra::DMatrix;
 
+use super::failure::{Runs, Sample};
+use super::refine::{POPULATION, Phase, refine};
+use super::{PolicySearch, SOLVER};
 use crate::belief::{BeliefMdp, LevelId};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::Model;
 use crate::observe::Observer;
 use crate::policy::{Automaton, Controller};
 use crate::solve::compile::{annotate, planes};
-use crate::solve::hazard::{Runs, Sample};
 use crate::solve::lqr::lqr_gain;
-use crate::solve::refine::{Phase, refine};
-
-/// Most [`Settings::effort`].
-pub const MOST_EFFORT: f64 = 1000.0;
-
-/// Settings of the planner.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Cost of the strongest control of the actions, in units of the cost of being at a limit, above 0.
-    pub control_weight: f64,
-    /// Factor on the length of all simulations, above 0, at most [`MOST_EFFORT`]; 1 is the thorough search.
-    pub effort: f64,
-    /// Seed of every random number.
-    pub seed: u64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            control_weight: 0.01,
-            effort: 1.0,
-            seed: 1,
-        }
-    }
-}
-
-/// Most variables a grid is made for.
-const GRID_VARIABLES: usize = 3;
-
-/// Name of the solver.
-const SOLVER: &str = "kbvi-closed";
+use crate::solve::settings::Settings;
+use crate::solve::solver::refuse_if;
 
 /// Groups of levels end where the variances, in units of the limits squared, fall below so many times their steady sum.
 const GROUPS_END: [f64; 2] = [5.0, 1.3];
@@ -57,19 +30,20 @@ const GROUPS_END: [f64; 2] = [5.0, 1.3];
 const RARE: f64 = 1e-6;
 const FREQUENT: f64 = 1e-5;
 
-/// Whether a model has too many variables for a grid, and limits to stay within.
-pub fn suits(model: &Model) -> bool {
-    model.state_dim() > GRID_VARIABLES && !model.episode.alive.sides.is_empty()
-}
-
 /// Plans a policy that stays within the model's failure limits.
 ///
 /// # Errors
 /// [`Error::Unsupported`] for a model without limits around the origin, with several modes or hypotheses to track, or with
 /// actions that differ in their noise; [`Error::Setting`] for settings out of range; as [`lqr_gain`] where the limits cannot be
 /// kept by any control.
-pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> Result<Automaton> {
-    check(mdp, settings)?;
+pub fn search(
+    mdp: &BeliefMdp,
+    settings: &PolicySearch,
+    seed: u64,
+    observer: &dyn Observer,
+) -> Result<Automaton> {
+    settings.validate()?;
+    refuse_if(SOLVER, mdp.model(), refusal(mdp))?;
     let groups = groups_of_levels(mdp);
     let steady = groups[groups.len() - 1].1;
     observer.note(&format!(
@@ -79,12 +53,13 @@ pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> R
         groups.len() * mdp.model().actions.len(),
         steps(settings, groups.len()) / 1e6,
     ));
-    let mut search = Search::new(mdp, settings, observer, groups, greedy_gain(mdp, settings)?);
+    let gain = greedy_gain(mdp, settings)?;
+    let mut search = Search::new(mdp, (settings, seed), observer, groups, gain);
     observer.progress("policy search", 0, search.total);
     search.improve_steady(steady);
     search.improve_early();
     let mut automaton = search.automaton(&search.gains);
-    annotate(&mut automaton, mdp, ANNOTATED, settings.seed);
+    annotate(&mut automaton, mdp, ANNOTATED, seed);
     Ok(automaton)
 }
 
@@ -104,7 +79,8 @@ const AFTERMATH: usize = 40;
 /// Everything the search shares.
 struct Search<'a> {
     mdp: &'a BeliefMdp,
-    settings: &'a Settings,
+    settings: &'a PolicySearch,
+    seed: u64,
     observer: &'a dyn Observer,
     groups: Vec<planes::Group>,
     scale: Vec<f64>,
@@ -118,7 +94,7 @@ impl<'a> Search<'a> {
     /// Begins with the same gain everywhere, and measures the scale of every variable under it.
     fn new(
         mdp: &'a BeliefMdp,
-        settings: &'a Settings,
+        (settings, seed): (&'a PolicySearch, u64),
         observer: &'a dyn Observer,
         groups: Vec<planes::Group>,
         gain: DMatrix<f64>,
@@ -130,6 +106,7 @@ impl<'a> Search<'a> {
         let mut search = Self {
             mdp,
             settings,
+            seed,
             observer,
             gains: vec![gain; groups.len()],
             groups,
@@ -161,7 +138,7 @@ impl<'a> Search<'a> {
         Sample {
             runs,
             steps: ((steps as f64 * self.settings.effort) as usize).max(1),
-            seed: self.settings.seed.wrapping_mul(1000).wrapping_add(phase),
+            seed: self.seed.wrapping_mul(1000).wrapping_add(phase),
         }
     }
 
@@ -193,10 +170,11 @@ impl<'a> Search<'a> {
             return;
         }
         let horizon = self.groups[early].0 + AFTERMATH;
-        let sample = |count: usize, phase| Sample {
-            runs: ((count as f64 * self.settings.effort) as usize).max(1),
+        let (effort, seed) = (self.settings.effort, self.seed);
+        let sample = move |count: usize, phase| Sample {
+            runs: ((count as f64 * effort) as usize).max(1),
             steps: horizon,
-            seed: self.settings.seed.wrapping_mul(1000).wrapping_add(phase),
+            seed: seed.wrapping_mul(1000).wrapping_add(phase),
         };
         let runs = self.telling(Runs::from_start(self.mdp), sample(EARLY[0].0, 10));
         for (phase, (count, generations, step)) in (10..).zip(EARLY) {
@@ -238,11 +216,7 @@ impl<'a> Search<'a> {
         let settings = Phase {
             step,
             generations,
-            seed: self
-                .settings
-                .seed
-                .wrapping_mul(1000)
-                .wrapping_add(100 + phase),
+            seed: self.seed.wrapping_mul(1000).wrapping_add(100 + phase),
         };
         refine(
             gains,
@@ -258,8 +232,7 @@ impl<'a> Search<'a> {
 }
 
 /// Steps of belief that the search simulates.
-fn steps(settings: &Settings, groups: usize) -> f64 {
-    const POPULATION: f64 = crate::solve::refine::POPULATION as f64;
+fn steps(settings: &PolicySearch, groups: usize) -> f64 {
     let steady = STEADY
         .iter()
         .map(|(runs, steps, generations, _)| runs * steps * generations);
@@ -267,11 +240,11 @@ fn steps(settings: &Settings, groups: usize) -> f64 {
         .iter()
         .map(|(runs, generations, _)| runs * generations * (AFTERMATH + 25));
     let early = early.sum::<usize>() * usize::from(groups > 1);
-    (steady.sum::<usize>() + early) as f64 * POPULATION * settings.effort
+    (steady.sum::<usize>() + early) as f64 * POPULATION as f64 * settings.effort
 }
 
 /// The regulator's gain (`p x n`) for one unit of cost at each limit, and `control_weight` for the strongest control.
-fn greedy_gain(mdp: &BeliefMdp, settings: &Settings) -> Result<DMatrix<f64>> {
+fn greedy_gain(mdp: &BeliefMdp, settings: &PolicySearch) -> Result<DMatrix<f64>> {
     let model = mdp.model();
     let p = model.motion.b.ncols();
     let strongest = |j: usize| {
@@ -324,48 +297,13 @@ fn groups_of_levels(mdp: &BeliefMdp) -> Vec<planes::Group> {
     groups
 }
 
-fn check(mdp: &BeliefMdp, settings: &Settings) -> Result<()> {
-    let positive = |value: f64, most: f64| value > 0.0 && value <= most;
-    let (weight, effort) = (settings.control_weight, settings.effort);
-    for (setting, value, fits, range) in [
-        (
-            "control_weight",
-            weight,
-            positive(weight, f64::MAX),
-            "above 0",
-        ),
-        (
-            "effort",
-            effort,
-            positive(effort, MOST_EFFORT),
-            "above 0, at most 1000",
-        ),
-    ] {
-        if !fits {
-            return Err(Error::Setting {
-                setting,
-                value: value.to_string(),
-                range,
-            });
-        }
-    }
-    match refusal(mdp) {
-        None => Ok(()),
-        Some(reason) => Err(Error::Unsupported {
-            solver: SOLVER,
-            model: mdp.model().name.clone(),
-            reason,
-        }),
-    }
-}
-
 /// Why a model cannot be planned for, and what would do.
 pub fn refusal(mdp: &BeliefMdp) -> Option<String> {
     let model = mdp.model();
     let sides = &model.episode.alive.sides;
     if sides.is_empty() {
         Some(format!(
-            "it has {} state variables, too many for a grid, and no failure limits to plan by; state it in at most {GRID_VARIABLES} variables, or add `alive` to [episode]",
+            "it has {} state variables, and no failure limits to plan by; add `alive` to [episode], or use value-iteration where there are at most 3 variables",
             model.state_dim()
         ))
     } else if let Some((i, side)) = sides
@@ -377,7 +315,7 @@ pub fn refusal(mdp: &BeliefMdp) -> Option<String> {
             side.low, side.high, model.state[*i].name
         ))
     } else if model.modes.len() > 1 || !mdp.is_gaussian() {
-        Some("a quadratic value knows nothing of modes, walls or hypotheses; state the problem without them, or in at most 3 variables".to_owned())
+        Some("a quadratic value knows nothing of modes, walls or hypotheses; state the problem without them, or use value-iteration".to_owned())
     } else if mdp.levels().classes().len() > 1 {
         Some("its actions differ in their noise, so that its levels are no chain; give all actions the same noise".to_owned())
     } else {

@@ -1,0 +1,59 @@
+//! KAFAQ as a course, by either of its rules.
+
+use std::ops::ControlFlow;
+
+use serde::{Deserialize, Serialize};
+
+use super::settings::{Rules, Settings};
+use super::task::{SOLVER, Task};
+use super::{Learned, Learning, printed, tested};
+use crate::error::Result;
+use crate::observe::Observer;
+use crate::solve::learn::{Course, Owner};
+
+/// All that a run has to remember between two pieces of work.
+// There is one at a time, so its size does not matter.
+#[allow(clippy::large_enum_variant)]
+#[derive(Debug, Serialize, Deserialize)]
+pub enum State {
+    /// By tests on evidence, epoch by epoch.
+    Tested(tested::State),
+    /// As in Figure 4.5, episode by episode.
+    Printed(printed::State),
+}
+
+impl Course for Task<'_> {
+    type Settings = Settings;
+    type State = State;
+    type Learning = Learning;
+
+    fn owner(&self) -> Owner<'_, Settings> {
+        Owner {
+            solver: SOLVER,
+            problem: &self.mdp.model().name,
+            fingerprint: self.fingerprint,
+            settings: &self.settings,
+        }
+    }
+
+    fn start(&self) -> Result<State> {
+        Ok(match self.settings.rules {
+            Rules::Tested => State::Tested(tested::State::new(self)),
+            Rules::Printed => State::Printed(printed::State::new(self)),
+        })
+    }
+
+    fn step(&self, state: &mut State, observer: &dyn Observer) -> Result<ControlFlow<()>> {
+        Ok(match state {
+            State::Tested(state) => state.advance(self, observer),
+            State::Printed(state) => state.advance(self, observer),
+        })
+    }
+
+    fn learned(&self, state: &State) -> Learned {
+        match state {
+            State::Tested(state) => state.learned(self),
+            State::Printed(state) => state.learned(self),
+        }
+    }
+}

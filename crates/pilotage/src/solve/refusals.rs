@@ -1,0 +1,52 @@
+//! What planners refuse for the same reasons, with what would do.
+
+use crate::model::{Interval, Model, When};
+
+/// Those that maximise reward need some.
+pub fn nothing_paid(model: &Model) -> Option<String> {
+    let pays = !model.rewards.is_empty()
+        || !model.events.is_empty()
+        || model.episode.failure_reward != 0.0
+        || model.cost.is_some();
+    (!pays).then(|| "nothing in it pays a reward; add a [[reward]] or a [cost]".to_owned())
+}
+
+/// Sums without end need a discount.
+pub fn reward_missing(model: &Model) -> Option<String> {
+    if let Some(reason) = nothing_paid(model) {
+        return Some(reason);
+    }
+    (model.discount >= 1.0).then(|| {
+        "its discount is 1, and a sum without end needs one below 1; set `discount` to 0.99 or less"
+            .to_owned()
+    })
+}
+
+/// Some solvers pay by `r(s, a)` only.
+pub fn pays_afterwards(model: &Model) -> Option<String> {
+    let rewards = model.rewards.iter().map(|reward| reward.when);
+    let mut asked = rewards.chain(model.events.iter().map(|event| event.when));
+    asked.any(|when| when == When::After).then(|| {
+        "it pays for where a step has led (`when = \"after\"`), and this solver only for where it begins; use value-iteration or state the rewards by action and place".to_owned()
+    })
+}
+
+/// Values of true states do not tell the step.
+pub fn changes(model: &Model) -> Option<String> {
+    let clock = model.clock();
+    (clock > 0).then(|| {
+        format!("what it pays or changes depends on the step of the episode up to step {clock}, and this solver's values do not; use value-iteration")
+    })
+}
+
+/// Planners on a grid need to know where to put it.
+pub fn bound_missing(model: &Model) -> Option<String> {
+    let unbounded = model
+        .state
+        .iter()
+        .find(|variable| variable.bounds == Interval::ALL)?;
+    Some(format!(
+        "`{}` has no bounds to put a grid between; add `bounds` to [state]",
+        unbounded.name
+    ))
+}
