@@ -53,6 +53,20 @@ fn key_and_value(text: &str) -> Result<(String, String), String> {
     Ok((key.trim().to_owned(), value.trim().to_owned()))
 }
 
+/// What the files of the curves end in.
+const CURVES: [&str; 2] = ["returns.svg", "values.svg"];
+
+#[derive(Args)]
+#[command(next_help_heading = "Learner settings")]
+struct Learner {
+    /// Keep the state of learning in this file, and go on from there if it exists.
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+    /// Draw how learning went: FILE-returns.svg and FILE-values.svg.
+    #[arg(long, value_name = "FILE")]
+    curves: Option<PathBuf>,
+}
+
 impl Learner {
     /// Whether any of it was asked for.
     fn is_given(&self) -> bool {
