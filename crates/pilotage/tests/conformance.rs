@@ -229,7 +229,7 @@ fn every_model_has_a_solver_and_every_solver_a_model() {
     for (model, first) in [
         ("corridor", "value-iteration"),
         ("cart-pole", "policy-search"),
-        ("scalar-lqg", "lqg"),
+        ("scalar-lqg", "value-iteration"),
     ] {
         let model = scenario::find(model).unwrap().model;
         assert_eq!(registry.first_for(&model).unwrap().name(), first);
@@ -329,7 +329,7 @@ fn uncertainty_that_grows_for_ever_is_refused_with_its_direction() {
     // Detectable: sensed, or dying out by itself.
     for scenario in [with_drift(1.2, 1.0, 0.1), with_drift(0.9, 0.0, 0.1)] {
         let grid = Settings {
-            points: Some(25),
+            points: Some(31),
             ..Settings::default()
         };
         plan(&Mls { grid }, &scenario.model, &short(Form::Grid), &Silent).unwrap();
