@@ -1,6 +1,7 @@
 //! `pilotage check`
 
 use std::io::Write;
+use std::path::PathBuf;
 
 use clap::Args;
 use pilotage::Error;
@@ -15,7 +16,7 @@ use crate::failure::Failure;
 pub struct Arguments {
     /// A model file, or the name of a built-in problem.
     #[arg(required_unless_present = "schema")]
-    file: Option<String>,
+    file: Option<PathBuf>,
     /// Print the JSON schema of model files instead.
     #[arg(long, conflicts_with = "file")]
     schema: bool,
@@ -34,6 +35,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let registry = Registry::builtin();
     let mdp = BeliefMdp::new(&model);
     let levels = mdp.levels();
+    levels.check(&model)?;
     let sd = |level: usize| -> Vec<f64> {
         levels
             .covariance(level)

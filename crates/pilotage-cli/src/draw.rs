@@ -9,7 +9,7 @@ use pilotage::policy::write_whole;
 use pilotage_report::{automaton_svg, belief_map_svg};
 
 use crate::failure::Failure;
-use crate::options::{beside, policy_and_problem};
+use crate::options::{beside, policy_and_problem, shown};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -17,7 +17,7 @@ pub struct Arguments {
     policy: PathBuf,
     /// Model file of the problem, where it is not a built-in one.
     #[arg(long)]
-    problem: Option<String>,
+    problem: Option<PathBuf>,
     /// Folder to write to; beside the policy file otherwise.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -27,6 +27,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (automaton, scenario) =
         policy_and_problem(&arguments.policy, arguments.problem.as_deref())?;
     let mdp = BeliefMdp::new(&scenario.model);
+    mdp.levels().check(&scenario.model)?;
     let pictures = [
         ("automaton.svg", automaton_svg(&automaton)?),
         (
@@ -42,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             _ => beside,
         };
         write_whole(&path, picture.as_bytes())?;
-        writeln!(out, "{}", path.display())?;
+        writeln!(out, "{}", shown(&path))?;
     }
     Ok(())
 }

@@ -12,7 +12,10 @@ mod simulate;
 mod solve;
 mod summary;
 
+use std::process::ExitCode;
+
 use clap::{Parser, Subcommand};
+use pilotage::error::visible;
 
 use failure::Failure;
 
@@ -20,7 +23,6 @@ use failure::Failure;
 #[derive(Parser)]
 #[command(
     version,
-    about,
     max_term_width = 100,
     arg_required_else_help = true,
     after_help = "`pilotage solve --help` lists the settings of every solver."
@@ -46,8 +48,12 @@ enum Verb {
     Reproduce(reproduce::Arguments),
 }
 
-fn main() -> std::process::ExitCode {
-    let outcome = match Cli::parse().verb {
+fn main() -> ExitCode {
+    let verb = match Cli::try_parse() {
+        Ok(cli) => cli.verb,
+        Err(message) => return not_parsed(&message),
+    };
+    let outcome = match verb {
         Verb::List(arguments) => list::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments),
         Verb::Solve(arguments) => solve::run(&arguments),
@@ -56,11 +62,32 @@ fn main() -> std::process::ExitCode {
         Verb::Reproduce(arguments) => reproduce::run(&arguments),
     };
     match outcome {
-        Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(Failure::Closed) => std::process::ExitCode::SUCCESS,
+        Ok(()) | Err(Failure::Closed) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("{}", failure.render());
-            std::process::ExitCode::FAILURE
+            failure::say(&failure.render());
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Shows help, the version, or what is wrong with the command line.
+fn not_parsed(message: &clap::Error) -> ExitCode {
+    let hidden = |argument: std::ffi::OsString| {
+        let argument = argument.to_string_lossy();
+        visible(&argument) != argument
+    };
+    // Colours are those of the parser, unless the command line has some of its own.
+    let printed = if std::env::args_os().any(hidden) {
+        failure::say(&visible(&message.to_string()));
+        Ok(())
+    } else {
+        message.print()
+    };
+    match printed.map_err(Failure::from) {
+        Ok(()) | Err(Failure::Closed) => ExitCode::from(message.exit_code() as u8),
+        Err(failure) => {
+            failure::say(&failure.render());
+            ExitCode::FAILURE
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use pilotage::error::visible;
 use pilotage::policy::Automaton;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate;
@@ -19,7 +20,7 @@ pub struct Evaluation {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Threads to use; the numbers do not depend on it. 0 uses every core.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = threads)]
     pub threads: usize,
 }
 
@@ -46,6 +47,16 @@ pub fn start_threads(threads: usize) -> Result<(), Failure> {
         .map_err(|error| Failure::Usage(format!("cannot start {threads} threads: {error}")))
 }
 
+/// A number of threads: what a machine may have, and not so many that it is busy with nothing but starting them.
+pub fn threads(text: &str) -> Result<usize, String> {
+    const MOST: usize = 1024;
+    match text.parse() {
+        Ok(number) if number <= MOST => Ok(number),
+        Ok(_) => Err(format!("must be at most {MOST}; 0 uses every core")),
+        Err(error) => Err(format!("{error}")),
+    }
+}
+
 /// A whole number above 0.
 pub fn at_least_one(text: &str) -> Result<usize, String> {
     match text.parse() {
@@ -58,22 +69,36 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 /// Reads a policy file together with the problem it belongs to: the one given, or the built-in one it names.
 pub fn policy_and_problem(
     policy: &Path,
-    problem: Option<&str>,
+    problem: Option<&Path>,
 ) -> Result<(Automaton, Scenario), Failure> {
     let automaton = Automaton::load(policy)?;
-    let scenario = scenario::find(problem.unwrap_or(&automaton.problem))?;
-    automaton.check_problem(&scenario.model, &policy.display().to_string())?;
+    let origin = shown(policy);
+    let scenario = match problem {
+        Some(problem) => scenario::find(problem)?,
+        // A file says whose policy it is, not which other files are read.
+        None => match scenario::builtin(&automaton.problem) {
+            Some(text) => scenario::read(text, &automaton.problem)?,
+            None => {
+                return Err(Failure::Usage(format!(
+                    "{origin}: this policy is for {}, which is not built in; give its model file with --problem",
+                    automaton.problem
+                )));
+            }
+        },
+    };
+    automaton.check_problem(&scenario.model, &origin)?;
     Ok((automaton, scenario))
 }
 
-/// An argument as it is typed in a shell: in quotes where it needs them, and never taken for an option.
-pub fn quoted(argument: &str) -> String {
+/// A file name as it is typed in a shell: in quotes where it needs them, and never taken for an option.
+pub fn quoted(path: &Path) -> String {
     let plain =
         |c: char| c.is_alphanumeric() || "_./-+=:,@%".contains(c) || (cfg!(windows) && c == '\\');
-    let argument = if argument.starts_with('-') {
-        format!("./{argument}")
+    let shown = shown(path);
+    let argument = if shown.starts_with('-') {
+        format!("./{shown}")
     } else {
-        argument.to_owned()
+        shown
     };
     if !argument.is_empty() && argument.chars().all(plain) {
         argument
@@ -84,11 +109,14 @@ pub fn quoted(argument: &str) -> String {
     }
 }
 
+/// A file name as it can be shown anywhere.
+pub fn shown(path: &Path) -> String {
+    visible(&path.display().to_string()).into_owned()
+}
+
 /// A file name beside `path`: its stem, a dash, and `suffix`.
 pub fn beside(path: &Path, suffix: &str) -> PathBuf {
-    let stem = path.file_stem().map_or_else(
-        || "policy".to_owned(),
-        |stem| stem.to_string_lossy().into_owned(),
-    );
-    path.with_file_name(format!("{stem}-{suffix}"))
+    let mut name = path.file_stem().unwrap_or("policy".as_ref()).to_owned();
+    name.push(format!("-{suffix}"));
+    path.with_file_name(name)
 }

@@ -8,6 +8,8 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pilotage::observe::Observer;
 
+use crate::failure::say;
+
 /// Time between two lines in a pipe. Work that ends sooner says nothing there.
 const EVERY: Duration = Duration::from_secs(10);
 
@@ -83,7 +85,7 @@ impl Observer for Bars {
         }
         match self.work.lock().ok().as_ref().map(|work| &work.bar) {
             Some(Some(bar)) => bar.println(message),
-            _ => say(&mut std::io::stderr(), message),
+            _ => say(message),
         }
     }
 }
@@ -249,13 +251,9 @@ fn tell(work: &Weak<Mutex<Work>>, every: Duration, mut to: impl Write) {
         let Ok(line) = work.lock().map(|work| work.line(Instant::now())) else {
             return;
         };
-        say(&mut to, &line);
+        // Progress that nobody can read is no reason to stop.
+        let _ = writeln!(to, "{line}");
     }
-}
-
-/// Progress that nobody can read is no reason to stop.
-fn say(to: &mut impl Write, line: &str) {
-    let _ = writeln!(to, "{line}");
 }
 
 #[cfg(test)]

@@ -29,7 +29,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads to use; the numbers do not depend on it. 0 uses every core.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = crate::options::threads)]
     threads: usize,
     /// Name what can be made, and stop.
     #[arg(long)]
@@ -123,7 +123,7 @@ fn write(report: &Report, out: &Path) -> Result<(), Failure> {
     for (name, text) in [("report.md", markdown), ("report.html", page_html(report))] {
         let path = out.join(name);
         write_whole(&path, text.as_bytes())?;
-        writeln!(printed, "{}", path.display())?;
+        writeln!(printed, "{}", crate::options::shown(&path))?;
     }
     for verdict in Verdict::ALL {
         let count = report

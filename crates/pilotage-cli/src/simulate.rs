@@ -13,20 +13,20 @@ use pilotage::simulate::wake_up::{Settings, measure};
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::options::{Evaluation, policy_and_problem};
+use crate::options::{Evaluation, policy_and_problem, shown};
 use crate::progress::Bars;
 use crate::summary;
 
 #[derive(Args)]
 pub struct Arguments {
     /// Name of a built-in problem, or a model file.
-    problem: String,
+    problem: PathBuf,
     /// A policy file written by `pilotage solve --out`.
     #[arg(long)]
     policy: PathBuf,
     /// Act in the world of another model with the same actions and sensor, such as robot-basic for a policy of basic.
     #[arg(long, value_name = "PROBLEM", conflicts_with = "wake_up")]
-    world: Option<String>,
+    world: Option<PathBuf>,
     /// Carry the robot to one of its start places, tell it so, and let it find out which (models with several starts).
     #[arg(long)]
     wake_up: bool,
@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => scenario,
         Some(world) => {
             let world = scenario::find(world)?;
-            automaton.check_world(&world.model, &arguments.policy.display().to_string())?;
+            automaton.check_world(&world.model, &shown(&arguments.policy))?;
             world
         }
     };
@@ -60,6 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         arguments.evaluation.options(),
         &bars,
     );
+    evaluation.check()?;
     let seconds = clock.elapsed().as_secs_f64();
     let mut out = std::io::stdout().lock();
     if arguments.json {

@@ -6,15 +6,16 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use pilotage::model::WallBelief;
-use pilotage::policy::write_whole;
+use pilotage::policy::{check_writable, write_whole};
 use pilotage::scenario::{self, Scenario, Walls};
 use pilotage::simulate::{Estimate, Evaluation as Earned};
+use pilotage::solve::policy_search::MOST_EFFORT;
 use pilotage::solve::{Entry, Form, Registry, Request, Solution, Solver, solve};
 use pilotage_report::{returns_svg, values_svg};
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::options::{Evaluation, at_least_one, beside, quoted};
+use crate::options::{Evaluation, at_least_one, beside, quoted, shown as shown_path};
 use crate::progress::Bars;
 use crate::settings_help::settings_of_solvers;
 use crate::summary;
@@ -23,7 +24,7 @@ use crate::summary;
 #[command(after_help = settings_of_solvers())]
 pub struct Arguments {
     /// Name of a built-in problem (see `pilotage list`), or a model file.
-    problem: String,
+    problem: PathBuf,
     /// Solver to use (see `pilotage list`); default: the first planner that accepts the problem.
     #[arg(long, value_name = "SOLVER")]
     with: Option<String>,
@@ -47,6 +48,9 @@ pub struct Arguments {
     learner: Learner,
 }
 
+/// What the files of the curves end in.
+const CURVES: [&str; 2] = ["returns.svg", "values.svg"];
+
 #[derive(Args)]
 #[command(next_help_heading = "Learner settings")]
 struct Learner {
@@ -56,6 +60,14 @@ struct Learner {
     /// Draw how learning went: FILE-returns.svg and FILE-values.svg.
     #[arg(long, value_name = "FILE")]
     curves: Option<PathBuf>,
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(factor) if factor > 0.0 && factor <= MOST_EFFORT => Ok(factor),
+        Ok(_) => Err(format!("must be above 0, at most {MOST_EFFORT}")),
+        Err(error) => Err(format!("{error}")),
+    }
 }
 
 fn key_and_value(text: &str) -> Result<(String, String), String> {
@@ -79,11 +91,11 @@ impl Learner {
             return Ok(Vec::new());
         };
         let pictures = [
-            ("returns.svg", returns_svg(automaton, learning)?),
-            ("values.svg", values_svg(automaton, learning)?),
+            returns_svg(automaton, learning)?,
+            values_svg(automaton, learning)?,
         ];
         let mut files = Vec::new();
-        for (suffix, picture) in pictures {
+        for (suffix, picture) in CURVES.into_iter().zip(pictures) {
             let file = beside(path, suffix);
             write_whole(&file, picture.as_bytes())?;
             files.push(file);
@@ -117,7 +129,7 @@ struct Told {
     #[arg(long, value_name = "STEPS", value_parser = at_least_one)]
     group: Option<usize>,
     /// Factor on the length of a policy search's simulations: less is faster, more is thorougher.
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
     effort: Option<f64>,
     /// kbvi looks less far ahead with every step of an episode.
     #[arg(long)]
@@ -156,6 +168,18 @@ impl Formula {
             ("spread_formula", others),
             ("integral_formula", others),
         ]
+    }
+}
+
+impl Arguments {
+    /// Files that cannot be written are known before work is done that they should keep.
+    fn check_files(&self) -> Result<(), Failure> {
+        let curves = self.learner.curves.iter();
+        let curves = curves.flat_map(|path| CURVES.map(|suffix| beside(path, suffix)));
+        for path in self.out.clone().into_iter().chain(curves) {
+            check_writable(&path)?;
+        }
+        Ok(())
     }
 }
 
@@ -274,6 +298,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             entry.name()
         )));
     }
+    arguments.check_files()?;
     let (solver, runs) = arguments.told.solver(&registry, entry)?;
     let solver = &solver;
     if arguments.out.is_some() && !solver.makes_automaton(&scenario.model) {
@@ -301,6 +326,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let curves = arguments.learner.draw(&solution)?;
     let clock = Instant::now();
     let earned = solution.evaluate(&scenario, arguments.evaluation.options(), &bars)?;
+    earned.check()?;
     let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
     let lost = arguments
         .value_lost
@@ -328,7 +354,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             )?;
         }
         for file in curves {
-            writeln!(out, "  {}", file.display())?;
+            writeln!(out, "  {}", shown_path(&file))?;
         }
     }
     Ok(())
@@ -412,15 +438,15 @@ fn shown(
         arguments.evaluation.seed
     ));
     if let (Some(path), Some(_)) = (&arguments.out, solution.automaton()) {
-        let file = path.display().to_string();
         // A policy names its problem, which is enough to find a built-in one.
-        let problem = match scenario::builtin(&arguments.problem) {
+        let problem = match arguments.problem.to_str().and_then(scenario::builtin) {
             Some(_) => String::new(),
             None => format!(" --problem {}", quoted(&arguments.problem)),
         };
         lines.push(format!(
-            "  kept in {file}; `pilotage draw {}{problem}` draws it",
-            quoted(&file)
+            "  kept in {}; `pilotage draw {}{problem}` draws it",
+            shown_path(path),
+            quoted(path)
         ));
     }
     lines.push(String::new());

@@ -1,5 +1,5 @@
 //! What the workspace depends on: licences and sources, as `deny.toml` allows them. Versions known to be unsafe are left to cargo-deny,
-//! which asks a database.
+//! which asks a database. And what those need who depend on the crates of the workspace.
 #![allow(clippy::unwrap_used)]
 
 use std::path::{Path, PathBuf};
@@ -141,4 +141,47 @@ fn every_dependency_has_a_licence_and_a_source_that_are_allowed() {
         })
         .collect();
     assert!(wrong.is_empty(), "deny.toml does not allow {wrong:#?}");
+}
+
+#[test]
+fn every_crate_of_the_workspace_says_what_it_is_and_carries_its_licences() {
+    let packages = packages();
+    let own: Vec<&Value> = packages
+        .iter()
+        .filter(|package| package["source"].is_null())
+        .collect();
+    assert!(own.len() >= 2, "{own:?}");
+    for package in own {
+        let name = &package["name"];
+        for key in [
+            "description",
+            "documentation",
+            "license",
+            "readme",
+            "rust_version",
+        ] {
+            let text = package[key].as_str().unwrap_or_default();
+            assert!(!text.is_empty(), "{name} has no {key}");
+        }
+        for (key, most) in [("authors", 1), ("keywords", 5), ("categories", 5)] {
+            let count = package[key].as_array().unwrap().len();
+            assert!((1..=most).contains(&count), "{name}: {count} {key}");
+        }
+        assert!(package["metadata"]["docs"]["rs"].is_object(), "{name}");
+        assert_eq!(package["version"], env!("CARGO_PKG_VERSION"), "{name}");
+        let folder = Path::new(package["manifest_path"].as_str().unwrap())
+            .parent()
+            .unwrap();
+        for file in ["README.md", "LICENSE-MIT", "LICENSE-APACHE"] {
+            assert!(folder.join(file).exists(), "{name} has no {file}");
+        }
+        for dependency in package["dependencies"].as_array().unwrap() {
+            let requirement = dependency["req"].as_str().unwrap();
+            let (other, kind) = (&dependency["name"], &dependency["kind"]);
+            assert!(
+                requirement != "*" || !kind.is_null(),
+                "{name}: {other} of any version"
+            );
+        }
+    }
 }

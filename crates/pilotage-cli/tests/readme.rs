@@ -107,6 +107,13 @@ fn its_rust_is_that_of_the_crate_whose_documentation_runs_it() {
     assert_eq!(snippet(&whole), snippet(&of_crate));
 }
 
+#[test]
+fn citation_and_changelog_know_this_version() {
+    let version = env!("CARGO_PKG_VERSION");
+    assert!(read("CITATION.cff").contains(&format!("\nversion: {version}\n")));
+    assert!(read("CHANGELOG.md").contains(&format!("\n## {version}")));
+}
+
 /// Links into the repository that lead nowhere.
 #[test]
 fn what_it_links_to_is_there() {
@@ -115,13 +122,16 @@ fn what_it_links_to_is_there() {
         "ARCHITECTURE.md",
         "CONTRIBUTING.md",
         "CHANGELOG.md",
+        "SECURITY.md",
+        "docs/releasing.md",
     ] {
-        let text = read(file);
+        let path = workspace().join(file);
+        let text = fs::read_to_string(&path).unwrap();
         for target in text.split("](").skip(1) {
             let target = target.split([')', '#']).next().unwrap();
             let outside = target.is_empty() || target.contains("://");
             assert!(
-                outside || workspace().join(target).exists(),
+                outside || path.with_file_name(target).exists(),
                 "{file} links to {target}"
             );
         }

@@ -343,6 +343,7 @@ fn baseline(scenario: &Scenario) -> (String, Evaluation, Option<usize>) {
             undiscounted: estimate(steps as f64),
             steps: estimate(steps as f64),
             failed: 0.0,
+            lost: None,
         };
         return ("never out of equilibrium".to_owned(), upright, None);
     }

@@ -170,6 +170,7 @@ fn mode_seen(scenario: &Scenario, policy: &dyn Policy, options: Options) -> Eval
         undiscounted: Estimate::of(episodes.iter().map(|episode| episode.undiscounted)),
         steps: Estimate::of(episodes.iter().map(|episode| episode.steps as f64)),
         failed: 0.0,
+        lost: None,
     }
 }
 

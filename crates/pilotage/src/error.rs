@@ -1,6 +1,7 @@
 //! Errors of planning, learning and running. Errors of model files are [`crate::model::ModelError`].
 
-use std::path::PathBuf;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
 
 /// What went wrong, with the numbers and places needed to mend it.
 #[derive(Debug, thiserror::Error)]
@@ -29,6 +30,30 @@ pub enum Error {
         direction: String,
         /// What to change in the model.
         remedy: &'static str,
+    },
+    /// The uncertainty of a belief cannot be computed.
+    #[error(
+        "uncertainty level {level} is that of no belief: {entry} of {what} is {value:e}; the numbers of A, H and the noises are too large, or too far apart, to be multiplied: state the model in units, and with time steps, in which they are nearer to 1"
+    )]
+    Level {
+        /// The level, counted from the start.
+        level: usize,
+        /// The matrix.
+        what: String,
+        /// Which number of it.
+        entry: String,
+        /// The number.
+        value: f64,
+    },
+    /// There are more uncertainty levels than there is room for.
+    #[error(
+        "{levels} uncertainty levels of this model take {mebibytes} MiB, and there are more; set `level_limit` in [belief] to {levels} or less, or `level_tolerance` higher"
+    )]
+    TooManyLevels {
+        /// Levels that there is room for.
+        levels: usize,
+        /// Memory that they take, MiB.
+        mebibytes: usize,
     },
     /// A solver was given a model it is not made for.
     #[error("{solver} does not accept {model}: {reason}")]
@@ -96,6 +121,16 @@ pub enum Error {
         /// Memory allowed, MiB.
         limit: u64,
     },
+    /// An agent no longer had a belief to act on.
+    #[error(
+        "in episode {episode} the mean of the belief is not finite after step {step}: the state, or the filter's numbers, grow without end; let the motion of the model die out, shorten its episodes, or solve again if the policy was edited"
+    )]
+    Lost {
+        /// Number of the first episode in which it happened, from 0.
+        episode: u64,
+        /// Steps of that episode until then.
+        step: usize,
+    },
     /// A saved policy cannot be used here.
     #[error("{origin}: {reason}")]
     Policy {
@@ -105,7 +140,7 @@ pub enum Error {
         reason: String,
     },
     /// A checkpoint cannot be gone on with.
-    #[error("{}: {reason}", path.display())]
+    #[error("{}: {reason}", shown(path))]
     Checkpoint {
         /// The file.
         path: PathBuf,
@@ -113,7 +148,7 @@ pub enum Error {
         reason: String,
     },
     /// A file could not be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", shown(path))]
     Io {
         /// The file.
         path: PathBuf,
@@ -122,5 +157,56 @@ pub enum Error {
     },
 }
 
+/// A file name as it can be shown anywhere.
+fn shown(path: &Path) -> String {
+    visible(&path.display().to_string()).into_owned()
+}
+
+/// Whether a character is not seen where it stands but changes what is seen: control characters, which terminals obey, and marks that
+/// turn the direction of writing. Line breaks and tabs count.
+pub(crate) fn is_unseen(character: char) -> bool {
+    character.is_control()
+        || matches!(
+            character,
+            '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}'
+        )
+}
+
+/// The text with an escape such as `\u{1b}` for every control character and mark of direction but line breaks and tabs, so that it can
+/// be shown on a terminal wherever it is from.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    let hidden = |character: char| is_unseen(character) && !matches!(character, '\n' | '\t');
+    if !text.contains(hidden) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 8);
+    for character in text.chars() {
+        if hidden(character) {
+            shown.extend(character.escape_unicode());
+        } else {
+            shown.push(character);
+        }
+    }
+    Cow::Owned(shown)
+}
+
 /// Result of everything but reading a model.
 pub type Result<T> = std::result::Result<T, Error>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_terminals_obey_is_shown_and_the_rest_stays() {
+        for (text, shown) in [
+            ("naïve – 走廊\n\ttab", "naïve – 走廊\n\ttab"),
+            ("\u{1b}[31mred", "\\u{1b}[31mred"),
+            ("back\u{8}\r", "back\\u{8}\\u{d}"),
+            ("\u{9b}2J", "\\u{9b}2J"),
+            ("\u{202e}gpj.exe", "\\u{202e}gpj.exe"),
+        ] {
+            assert_eq!(visible(text), shown);
+        }
+    }
+}

@@ -32,6 +32,7 @@
 
 pub mod belief;
 pub mod error;
+mod files;
 pub mod model;
 pub mod observe;
 pub mod parallel;

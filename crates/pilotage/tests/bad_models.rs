@@ -124,6 +124,16 @@ const MISTAKES: &[Mistake] = &[
     row("corridor", "name = \"corridor\"", "name = \"\"", "\"\"\n", "no name", "short name"),
     row("tiger", "[actions]\nLISTEN = {}\nOPEN-LEFT = { then = \"end\" }\nOPEN-RIGHT = { then = \"end\" }", "[actions]", "[actions]", "no action", "STOP"),
     row("tiger", "then = \"end\"", "then = \"ends\"", "\"ends\"", "unknown value `ends`", "`end`"),
+    // Names that a terminal would obey, or that are not what they look like.
+    row("corridor", "name = \"corridor\"", "name = \"corri\\u001b[31mdor\"", "\"corri", "the character \\u{1b}", "can be seen"),
+    row("corridor", "about = \"", "about = \"\\u009b2J", "\"\\u009b", "a text with the character \\u{9b}", "can be seen"),
+    row("corridor", "names = [\"x\"]", "names = [\"x\\u0007\"]", "\"x\\u0007", "the character \\u{7}", "can be seen"),
+    row("corridor", EAST, "\"EA\\nST\" = { u = [1.0] }", "\"EA", "the character \\u{a}", "can be seen"),
+    row("corridor", EAST, "\"\u{202e}TSAE\" = { u = [1.0] }", "\"\u{202e}", "the character \\u{202e}", "can be seen"),
+    row("load-unload", "\"empty\", \"loaded\"]", "\"empty\", \"load\\bed\"]", "\"load\\b", "the character \\u{8}", "can be seen"),
+    // More than anyone waits for.
+    row("tiger", "level_tolerance = 1e-4", "level_limit = 100001", "100001", "100001 levels", "at most 100000"),
+    row("corridor", "[[0.0, 4.0]]", "[[-1e308, 1e308]]", "[-1e308", "infinite", "finite"),
     // Starts.
     row("tiger", "weight = 0.5", "weight = 0.7", "0.5", "sum to 1.2", "sum to 1"),
     row("tiger", "weight = 0.5", "weight = -0.5", "-0.5", "the weight is -0.5", "above 0"),
@@ -135,6 +145,8 @@ const MISTAKES: &[Mistake] = &[
     row("cart-pole", "linearise = \"cart-pole\"", "A = [[1.0]]", "[motion]", "`noise` is missing", "add `noise`"),
     row("cart-pole", "kind = \"cart-pole\"", "kind = \"linear\"\n[world.cart-poles]", "cart-poles", "unknown key `cart-poles`", "`cart-pole`"),
     row("cart-pole", "gravity = 9.8\n", "", "[world.cart-pole]", "`gravity` is missing", "add `gravity`"),
+    row("cart-pole", "gravity = 9.8", "gravity = 1e307", "[world.cart-pole]", "farther in a step than numbers reach", "shorter `step`"),
+    row("cart-pole", "step = 0.02", "step = 90.0", "[world.cart-pole]", "farther in a step than numbers reach", "shorter `step`"),
     // Walls and maps.
     row("corridor", "bounds = [[0.0, 4.0]]", "", "\"clamp\"", "there are no bounds", "add `bounds`"),
     row("maze-2d", "....\n...*", "...\n...*", "...\n...*", "row 3 has 3 characters and the first row has 4", "equally long"),
@@ -166,6 +178,8 @@ const MISTAKES: &[Mistake] = &[
     row("robot-basic", "radius = 0.05", "radius = 0.05\ncolour = 3", "colour", "unknown key `colour`", "known here"),
     row("robot-basic", "cell = 0.25", "cell = 0.0", "0.0 # m\nradius", "this is 0", "more than 0"),
     row("robot-basic", "speed = 0.15", "speed = -1.0", "-1.0 # m/s", "this is -1", "more than 0"),
+    row("robot-basic", "tick = 0.032", "tick = 1e-9", "1e-9", "commands to the wheels", "longer tick"),
+    row("robot-basic", "speed = 0.15", "speed = 1e-300", "0.032 # s", "commands to the wheels", "more `speed`"),
     row("robot-basic", "tick = 0.032", "tick = 0.0", "0.0 # s", "this is 0", "more than 0"),
     row("robot-basic", "slip = 0.3", "slip = -0.3", "-0.3", "this is -0.3", "0 or more"),
     row("robot-basic", "compass_noise = 0.02", "compass_noise = nan", "nan", "not a number", "finite"),
@@ -243,6 +257,89 @@ fn every_mistake_is_shown_at_its_place_with_a_hint() {
         MISTAKES.len(),
         wrong.join("\n")
     );
+}
+
+/// What is too much to be written into the table above.
+#[test]
+fn more_than_anyone_waits_for_is_refused_at_once() {
+    let corridor = scenario::builtin("corridor").unwrap();
+    let many = |count: usize, item: &dyn Fn(usize) -> String| {
+        (0..count).map(item).collect::<Vec<_>>().join(", ")
+    };
+    let drawing = |width: usize, rows: usize| {
+        let rows = format!("{}\n", "*".repeat(width)).repeat(rows);
+        format!("[map]\ncell = 1.0\nrows = '''\n{rows}'''\n")
+    };
+    let plane = corridor.replacen("names = [\"x\"]", "names = [\"x\", \"y\"]", 1);
+    let row = many(65, &|_| "1.0".to_owned());
+    let column = many(65, &|_| "[1.0]".to_owned());
+    let names = many(65, &|i| format!("\"x{i}\""));
+    let modes = many(1001, &|i| format!("\"m{i}\""));
+    let actions: String = (0..1001).map(|i| format!("A{i} = {{}}\n")).collect();
+    let goals = "[[reward]]\nin = \"*\"\nvalue = 1.0\n";
+    for (text, good, bad, message) in [
+        (
+            corridor,
+            "names = [\"x\"]",
+            format!("names = [{names}]"),
+            "65 state variables",
+        ),
+        (
+            corridor,
+            "names = [\"x\"]",
+            format!("names = [\"x\"]\nmodes = [{modes}]"),
+            "1001 modes",
+        ),
+        (
+            corridor,
+            "[actions]",
+            format!("[actions]\n{actions}"),
+            "1004 actions",
+        ),
+        (
+            corridor,
+            "B = [[1.0]]",
+            format!("B = [[{row}]]"),
+            "65 controls",
+        ),
+        (
+            corridor,
+            "H = [[1.0]]",
+            format!("H = [{column}]"),
+            "65 sensor readings",
+        ),
+        (
+            corridor,
+            "[world]",
+            drawing(500, 501) + "[world]",
+            "250500 characters",
+        ),
+        (
+            &plane,
+            "[world]",
+            drawing(400, 400) + goals + "[world]",
+            "160001 boxes",
+        ),
+    ] {
+        assert!(text.contains(good), "{good}");
+        let clock = std::time::Instant::now();
+        let error = error_of(&text.replacen(good, &bad, 1));
+        assert!(
+            error.message.contains(message),
+            "{message}: {}",
+            error.message
+        );
+        assert!(clock.elapsed().as_secs_f64() < 1.0, "{message}");
+    }
+}
+
+/// `B u` is of two numbers, each of which is one.
+#[test]
+fn a_displacement_beyond_all_numbers_is_refused() {
+    let text = scenario::builtin("corridor").unwrap();
+    let text = text.replacen("B = [[1.0]]", "B = [[1e200]]", 1);
+    let error = error_of(&text.replacen(EAST, "EAST = { u = [1e200] }", 1));
+    assert!(error.message.contains("B u is not finite"), "{error}");
 }
 
 #[test]

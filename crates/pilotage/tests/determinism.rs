@@ -29,7 +29,9 @@ fn bits(evaluation: &Evaluation) -> Vec<u64> {
         undiscounted,
         steps,
         failed,
+        lost,
     } = evaluation;
+    assert_eq!(*lost, None);
     [discounted, undiscounted, steps]
         .iter()
         .flat_map(|estimate| [estimate.mean, estimate.stderr])

@@ -302,3 +302,64 @@ proptest! {
         prop_assert!(apart(&predicted, &before) <= 1e-9 * before.amax().max(1.0));
     }
 }
+
+/// Numbers whose products are none, or are too far apart, make no levels; the message says which number it was.
+#[test]
+fn what_cannot_be_multiplied_is_refused_with_level_and_entry() {
+    for (name, good, bad, says) in [
+        (
+            "corridor",
+            "H = [[1.0]]",
+            "H = [[-1e308]]",
+            "level 0 is that of no belief: entry [0][0] of the innovation covariance of the step by EAST is inf",
+        ),
+        (
+            "corridor",
+            "A = [[1.0]]",
+            "A = [[1e200]]",
+            "predicted covariance",
+        ),
+        (
+            "corridor",
+            "noise = [[0.45]]",
+            "noise = [[1.7e308]]",
+            "innovation covariance",
+        ),
+        (
+            "cart-pole",
+            "step = 0.02",
+            "step = 9.0",
+            "level 1 is that of no belief: the smallest eigenvalue of the covariance is -",
+        ),
+    ] {
+        let text = pilotage::scenario::builtin(name).unwrap();
+        assert!(text.contains(good), "{name}: {good}");
+        let model = pilotage::scenario::read(&text.replacen(good, bad, 1), name)
+            .unwrap()
+            .model;
+        let error = BeliefMdp::new(&model).levels().check(&model).unwrap_err();
+        let message = error.to_string();
+        assert!(
+            message.contains(says) && message.contains("units"),
+            "{name}: {message}"
+        );
+    }
+    for name in pilotage::scenario::names() {
+        let model = built_in(name);
+        BeliefMdp::new(&model).levels().check(&model).unwrap();
+    }
+}
+
+/// A hundred thousand levels are found in a moment.
+#[test]
+fn many_levels_are_found_fast() {
+    let text = pilotage::scenario::builtin("tiger").unwrap();
+    let many = "level_tolerance = 0.0\nlevel_limit = 100000";
+    let text = text.replacen("level_tolerance = 1e-4", many, 1);
+    let model = pilotage::scenario::read(&text, "many").unwrap().model;
+    let clock = std::time::Instant::now();
+    let mdp = BeliefMdp::new(&model);
+    assert_eq!(mdp.levels().len(), 100_000);
+    mdp.levels().check(&model).unwrap();
+    assert!(clock.elapsed().as_secs_f64() < 5.0, "{:?}", clock.elapsed());
+}

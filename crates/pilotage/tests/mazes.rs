@@ -49,12 +49,6 @@ fn walk(scenario: &Scenario, seed: u64, plan: &[usize]) -> Vec<Vec<f64>> {
     way
 }
 
-fn with_walls(model: &Model, walls: WallBelief) -> Model {
-    let mut model = model.clone();
-    model.belief.walls = walls;
-    model
-}
-
 #[test]
 fn the_true_state_is_never_inside_a_wall_and_never_goes_through_one() {
     for name in ["n-maze", "u-maze", "maze-2d"] {
@@ -109,6 +103,13 @@ fn a_belief_that_knows_the_map_stays_where_a_state_can_be() {
     }
 }
 
+/// The model with another belief about walls.
+fn with_walls(model: &Model, walls: WallBelief) -> Model {
+    let mut model = model.clone();
+    model.belief.walls = walls;
+    model
+}
+
 #[test]
 fn the_prediction_of_such_a_belief_stops_at_a_wall() {
     let mdp = BeliefMdp::new(&find("u-maze").model);
@@ -124,7 +125,7 @@ fn the_prediction_of_such_a_belief_stops_at_a_wall() {
     assert!(predicted[0] < 2.0 && predicted[0] > 1.999, "{predicted:?}");
     let centre = &mdp.centres(0, &belief.mean, east)[0].1;
     assert_eq!(centre.as_slice(), predicted);
-    let plain = BeliefMdp::new(&with_walls(&model, WallBelief::Ignore));
+    let plain = BeliefMdp::new(&with_walls(model, WallBelief::Ignore));
     plain.filter().predict(&belief, east, &mut predicted);
     assert_eq!(predicted, [2.5, 2.5]);
 }

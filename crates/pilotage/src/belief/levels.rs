@@ -6,13 +6,17 @@
 
 use nalgebra::DMatrix;
 
-use super::kalman::{Correction, distance, square_root};
+use super::kalman::{Correction, square_root};
+use super::nearby::Nearby;
 use super::riccati::steady_state;
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Model};
 
 /// Covariances this close are the same number.
 const SAME: f64 = 1e-9;
+
+/// Most numbers that all levels and their steps may be.
+const MOST_NUMBERS: usize = 1 << 26;
 
 /// Index of an uncertainty level.
 pub type LevelId = usize;
@@ -43,8 +47,11 @@ pub struct LevelStep {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelGraph {
     covariances: Vec<DMatrix<f64>>,
+    nearby: Nearby,
     /// By level: the step of an episode at which it is held, no more than `clock`.
     times: Vec<usize>,
+    /// By step of an episode: how many levels are held at it.
+    held: Vec<usize>,
     /// The step from which on levels no longer tell the time.
     clock: usize,
     /// Whether an episode is over at the clock's last step.
@@ -58,6 +65,10 @@ pub struct LevelGraph {
     starts: Vec<LevelId>,
     /// Whether every chain closed before the limit of levels.
     converged: bool,
+    /// Most levels there is room for.
+    room: usize,
+    /// Whether there were more.
+    cramped: bool,
 }
 
 impl LevelGraph {
@@ -114,9 +125,14 @@ impl LevelGraph {
                     })
             })
             .collect();
+        let (n, m) = (model.state_dim(), model.observation_dim());
+        let step = 2 * n * n + n * m + m * m;
+        let room = MOST_NUMBERS / (n * n + classes.len() * step).max(1);
         Self {
             covariances: Vec::new(),
+            nearby: Nearby::default(),
             times: Vec::new(),
+            held: Vec::new(),
             clock: 0,
             ends: false,
             settled: Vec::new(),
@@ -125,6 +141,8 @@ impl LevelGraph {
             steps: Vec::new(),
             starts: Vec::new(),
             converged: true,
+            room,
+            cramped: false,
         }
     }
 
@@ -165,11 +183,10 @@ impl LevelGraph {
                 (self.settle(model, class, covariance), false)
             }
             Some(found) => (found, false),
-            None if self.held_at(time) < model.belief.level_limit => {
-                (self.add(covariance.clone(), time), false)
-            }
+            None if self.has_room(model, time) => (self.add(covariance.clone(), time), false),
             None => {
                 self.converged = false;
+                self.cramped |= self.held_at(time) < model.belief.level_limit;
                 (self.closest(covariance, time).unwrap_or(level), true)
             }
         }
@@ -191,6 +208,12 @@ impl LevelGraph {
     }
 
     fn add(&mut self, covariance: DMatrix<f64>, time: usize) -> LevelId {
+        self.nearby
+            .insert(&covariance, time, self.covariances.len());
+        if self.held.len() <= time {
+            self.held.resize(time + 1, 0);
+        }
+        self.held[time] += 1;
         self.covariances.push(covariance);
         self.times.push(time);
         self.settled.push(false);
@@ -200,7 +223,12 @@ impl LevelGraph {
 
     /// Number of levels that are held at a time.
     fn held_at(&self, time: usize) -> usize {
-        self.times.iter().filter(|known| **known == time).count()
+        self.held.get(time).copied().unwrap_or(0)
+    }
+
+    /// Whether one more level can be held at a time.
+    fn has_room(&self, model: &Model, time: usize) -> bool {
+        self.held_at(time) < model.belief.level_limit && self.len() < self.room
     }
 
     /// The level closest to a covariance among those held at a time.
@@ -209,12 +237,8 @@ impl LevelGraph {
     }
 
     fn nearest(&self, covariance: &DMatrix<f64>, tolerance: f64, time: usize) -> Option<LevelId> {
-        (0..self.covariances.len())
-            .filter(|&level| self.times[level] == time)
-            .map(|level| (level, distance(covariance, &self.covariances[level])))
-            .filter(|&(_, distance)| distance <= tolerance)
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(level, _)| level)
+        self.nearby
+            .nearest(&self.covariances, covariance, tolerance, time)
     }
 
     /// Number of levels.
@@ -279,6 +303,73 @@ impl LevelGraph {
         self.converged
     }
 
+    /// Checks that every covariance is one: finite, and positive semi-definite but for rounding.
+    ///
+    /// # Errors
+    /// [`Error::Level`] for the first level or step that has none, with the entry and what to change; [`Error::TooManyLevels`] where there
+    /// is no room for all of them.
+    pub fn check(&self, model: &Model) -> Result<()> {
+        if self.cramped {
+            return Err(Error::TooManyLevels {
+                levels: self.room,
+                mebibytes: (MOST_NUMBERS * size_of::<f64>()) >> 20,
+            });
+        }
+        for level in 0..self.len() {
+            self.check_level(model, level)?;
+            for (class, step) in self.steps[level].iter().enumerate() {
+                let correction = &step.correction;
+                for (what, matrix) in [
+                    ("predicted covariance", &correction.predicted),
+                    ("innovation covariance", &correction.innovation),
+                    ("gain", &correction.gain),
+                    ("covariance after it", &correction.covariance),
+                ] {
+                    if let Some((row, column)) = not_finite(matrix) {
+                        let action = (0..self.class_of_action.len())
+                            .find(|&action| self.class_of_action[action] == class)
+                            .map_or("", |action| &model.actions[action].name);
+                        return Err(Error::Level {
+                            level,
+                            what: format!("the {what} of the step by {action}"),
+                            entry: format!("entry [{row}][{column}]"),
+                            value: matrix[(row, column)],
+                        });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_level(&self, model: &Model, level: LevelId) -> Result<()> {
+        /// Share of the largest entry that rounding may make negative.
+        const ROUNDING: f64 = 1e-9;
+        let covariance = &self.covariances[level];
+        let name = |i: usize| &model.state[i].name;
+        let fail = |entry: String, value: f64| {
+            Err(Error::Level {
+                level,
+                what: "the covariance".to_owned(),
+                entry,
+                value,
+            })
+        };
+        if let Some((row, column)) = not_finite(covariance) {
+            let entry = format!("the entry of {} and {}", name(row), name(column));
+            return fail(entry, covariance[(row, column)]);
+        }
+        let scale = covariance.amax();
+        if scale == 0.0 {
+            return Ok(());
+        }
+        let least = (covariance / scale).symmetric_eigenvalues().min();
+        if least < -ROUNDING {
+            return fail("the smallest eigenvalue".to_owned(), least * scale);
+        }
+        Ok(())
+    }
+
     /// Checks that no uncertainty grows for ever. Levels that were cut at the limit while they still shrank will do.
     ///
     /// # Errors
@@ -320,4 +411,12 @@ impl LevelGraph {
         }
         None
     }
+}
+
+/// Row and column of the first entry that is not finite.
+fn not_finite(matrix: &DMatrix<f64>) -> Option<(usize, usize)> {
+    let entries = (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| (i, j)));
+    entries
+        .into_iter()
+        .find(|&entry| !matrix[entry].is_finite())
 }

@@ -211,8 +211,8 @@ impl BeliefMdp {
         region_probability(predicted.as_slice(), covariance, region)
     }
 
-    /// `A m + B u`, on this side of every wall the belief knows of.
-    fn predicted(&self, mean: &[f64], action: ActionId) -> DVector<f64> {
+    /// Where an action leads from a state or mean, noise apart: `A m + B u`, on this side of every wall the belief knows of.
+    pub fn predicted(&self, mean: &[f64], action: ActionId) -> DVector<f64> {
         let moved = &self.model.motion.a * DVector::from_column_slice(mean)
             + self.model.displacement(action);
         self.stop(mean, moved)

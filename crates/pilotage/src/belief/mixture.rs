@@ -111,6 +111,10 @@ fn suits(model: &Model) -> bool {
 }
 
 fn inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    // No decomposition of a matrix that is not finite comes to an end.
+    if matrix.iter().any(|entry| !entry.is_finite()) {
+        return matrix.clone();
+    }
     matrix
         .clone()
         .pseudo_inverse(1e-12 * matrix.amax().max(1e-300))

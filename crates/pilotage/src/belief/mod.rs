@@ -7,6 +7,7 @@ pub mod kalman;
 pub mod levels;
 pub mod mdp;
 mod mixture;
+mod nearby;
 pub mod recall;
 pub mod riccati;
 

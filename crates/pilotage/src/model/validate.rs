@@ -6,8 +6,18 @@ use nalgebra::DVector;
 
 use super::error::{Fault, Path};
 use super::*;
+use crate::error::is_unseen;
 pub(crate) use numbers::positive;
 use numbers::{covariance, finite, finite_matrix, shape, vector};
+
+/// Most state variables, controls, readings: matrices of more take longer than anyone waits.
+pub(crate) const MOST_DIMENSIONS: usize = 64;
+
+/// Most actions, and most modes.
+const MOST_NAMES: usize = 1000;
+
+/// Most uncertainty levels.
+const MOST_LEVELS: usize = 100_000;
 
 /// Weights of hypotheses may miss 1 by this much, which decimals such as 0.333333333 need.
 const WEIGHT_TOLERANCE: f64 = 1e-6;
@@ -60,11 +70,14 @@ impl Model {
                 "give a short name, such as \"corridor\"",
             ));
         }
+        check_seen(&self.name, Path::new("name"))?;
+        check_text(&self.about, Path::new("about"))?;
         for (i, StateVariable { bounds, .. }) in self.state.iter().enumerate() {
             let path = path.clone().key("bounds").index(i);
             if *bounds != Interval::ALL {
                 finite(bounds.low, path.clone().index(0))?;
                 finite(bounds.high, path.clone().index(1))?;
+                finite(bounds.width(), path.clone())?;
             }
             check_interval(*bounds, "the bounds", path)?;
         }
@@ -110,8 +123,21 @@ impl Model {
             motion.clone().key("B"),
         )?;
         finite_matrix(&self.motion.b, motion.clone().key("B"))?;
+        let controls = self.motion.b.ncols();
+        at_most(
+            controls,
+            MOST_DIMENSIONS,
+            "controls",
+            motion.clone().key("B"),
+        )?;
         covariance(&self.motion.noise, n, &variables, motion.key("noise"))?;
         let m = self.observation_dim();
+        at_most(
+            m,
+            MOST_DIMENSIONS,
+            "sensor readings",
+            sensor.clone().key("H"),
+        )?;
         shape(
             &self.sensor.h,
             (m.max(1), n),
@@ -134,6 +160,14 @@ impl Model {
         for action in &self.actions {
             let path = path.clone().key(&action.name);
             self.check_control(&action.control, &path)?;
+            let moved = &self.motion.b * &action.control;
+            if moved.iter().any(|x| !x.is_finite()) {
+                return Err(Fault::new(
+                    path.key("u"),
+                    "B u is not finite",
+                    "give smaller numbers, here or in B",
+                ));
+            }
             self.check_motion_noise(action.motion_noise.as_ref(), &path)?;
             if let Some(noise) = &action.sensor_noise {
                 covariance(
@@ -334,6 +368,12 @@ impl Model {
                 "give at least 1",
             ));
         }
+        at_most(
+            self.belief.level_limit,
+            MOST_LEVELS,
+            "levels",
+            path("level_limit"),
+        )?;
         Ok(())
     }
 
@@ -389,6 +429,14 @@ pub(crate) fn check_names<S: AsRef<str>>(
             "add one, such as `STOP = { u = [0.0] }`",
         ));
     }
+    at_most(
+        variables.len(),
+        MOST_DIMENSIONS,
+        "state variables",
+        state("names"),
+    )?;
+    at_most(modes.len(), MOST_NAMES, "modes", state("modes"))?;
+    at_most(actions.len(), MOST_NAMES, "actions", Path::new("actions"))?;
     check_unique(variables, "state variable", |i| state("names").index(i))?;
     if modes.len() > 1 || !modes[0].as_ref().is_empty() {
         check_unique(modes, "mode", |i| state("modes").index(i))?;
@@ -411,6 +459,10 @@ fn check_unique<S: AsRef<str>>(
                 "give it a name",
             ));
         }
+        check_seen(name, path(i)).map_err(|fault| Fault {
+            on_key: kind == "action",
+            ..fault
+        })?;
         if names[..i].iter().any(|earlier| earlier.as_ref() == name) {
             return Err(Fault::new(
                 path(i),
@@ -420,6 +472,41 @@ fn check_unique<S: AsRef<str>>(
         }
     }
     Ok(())
+}
+
+/// Checks that a name is what it looks like, and nothing that a terminal would obey.
+fn check_seen(name: &str, path: Path) -> Result<(), Fault> {
+    let Some(unseen) = name.chars().find(|character| is_unseen(*character)) else {
+        return Ok(());
+    };
+    Err(Fault::new(
+        path,
+        format!("a name with the character {}", unseen.escape_unicode()),
+        "use letters, digits and marks that can be seen",
+    ))
+}
+
+/// As [`check_seen`], for text that may have several lines.
+fn check_text(text: &str, path: Path) -> Result<(), Fault> {
+    text.split(['\n', '\t']).try_for_each(|part| {
+        let fault = |fault: Fault| Fault {
+            message: fault.message.replace("a name", "a text"),
+            ..fault
+        };
+        check_seen(part, path.clone()).map_err(fault)
+    })
+}
+
+/// Checks that there are not too many of something.
+pub(crate) fn at_most(count: usize, most: usize, what: &str, path: Path) -> Result<(), Fault> {
+    if count <= most {
+        return Ok(());
+    }
+    Err(Fault::new(
+        path,
+        format!("{count} {what}"),
+        format!("give at most {most}"),
+    ))
 }
 
 fn check_interval(interval: Interval, what: &str, path: Path) -> Result<(), Fault> {

@@ -7,10 +7,10 @@ mod controller;
 mod coordinates;
 mod store;
 
+pub use crate::files::{check_writable, write_whole};
 pub use automaton::{Automaton, Matching, Node, NodeId, Observed, Place};
 pub use controller::Controller;
 pub use coordinates::{Coordinates, MOST_COORDINATES};
-pub use store::write_whole;
 
 use crate::belief::Belief;
 use crate::model::ActionId;

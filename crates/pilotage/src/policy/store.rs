@@ -1,16 +1,19 @@
 //! Automata as files: versioned JSON, written whole or not at all.
 
-use std::io::Write;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::files::{read_text, write_whole};
 use crate::model::Model;
 use crate::policy::{Automaton, Node, Place};
 
 /// Version of the file format; a file of another is refused.
 const FORMAT: u32 = 1;
+
+/// Longest policy file that is read, MiB.
+const MOST_MEBIBYTES: u64 = 256;
 
 #[derive(Serialize, Deserialize)]
 struct Header {
@@ -75,7 +78,7 @@ impl Automaton {
     /// # Errors
     /// [`Error::Io`] where it cannot be read as text, otherwise as [`Automaton::from_json`].
     pub fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
+        let text = read_text(path, MOST_MEBIBYTES).map_err(|source| Error::Io {
             path: path.to_owned(),
             source,
         })?;
@@ -220,40 +223,4 @@ impl Automaton {
             .find(|(id, _)| *id >= self.nodes.len());
         stranger.map(|(id, _)| format!("names predecessor {id}, which is not there"))
     }
-}
-
-/// Writes a file so that its name always stands for a whole file: the old one or the new one.
-///
-/// # Errors
-/// [`Error::Io`]; the old file is then untouched.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let fail = |source| Error::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let mut file = beside(folder).map_err(fail)?;
-    file.write_all(bytes)
-        .and_then(|()| file.as_file().sync_all())
-        .map_err(fail)?;
-    file.persist(path)
-        .map(drop)
-        .map_err(|error| fail(error.error))
-}
-
-/// A temporary file that anyone may read who may read others made here: a result is no secret.
-#[cfg(unix)]
-fn beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    use std::os::unix::fs::PermissionsExt;
-    tempfile::Builder::new()
-        .permissions(std::fs::Permissions::from_mode(0o666))
-        .tempfile_in(folder)
-}
-
-#[cfg(not(unix))]
-fn beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    tempfile::NamedTempFile::new_in(folder)
 }

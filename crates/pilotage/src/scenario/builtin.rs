@@ -3,10 +3,15 @@
 use std::path::Path;
 
 use super::{Scenario, load, read};
+use crate::error::is_unseen;
 use crate::model::{ModelError, nearest, suggest};
 
 /// How the name of a model file ends.
 const SUFFIX: &str = ".toml";
+
+/// Most bytes of a name that is compared with others, and most files that it is compared with.
+const LONGEST: usize = 255;
+const MOST_FILES: usize = 1_000;
 
 macro_rules! models {
     ($($name:literal),* $(,)?) => {
@@ -60,11 +65,12 @@ pub fn builtin(name: &str) -> Option<&'static str> {
 ///
 /// # Errors
 /// If neither exists, with the nearest built-in name or model file as a hint, or if the file is not a valid model.
-pub fn find(name_or_path: &str) -> Result<Scenario, ModelError> {
-    if let Some(text) = builtin(name_or_path) {
-        return read(text, name_or_path);
+pub fn find(name_or_path: impl AsRef<Path>) -> Result<Scenario, ModelError> {
+    let path = name_or_path.as_ref();
+    let name = path.to_string_lossy();
+    if let Some(text) = builtin(&name) {
+        return read(text, &name);
     }
-    let path = Path::new(name_or_path);
     if path.exists() {
         return load(path);
     }
@@ -76,11 +82,11 @@ pub fn find(name_or_path: &str) -> Result<Scenario, ModelError> {
         });
     }
     Err(ModelError {
-        origin: name_or_path.into(),
+        origin: name.as_ref().into(),
         text: "".into(),
         place: None,
         message: "no built-in model and no file has this name".to_owned(),
-        hint: meant.unwrap_or_else(|| suggest(name_or_path, names())),
+        hint: meant.unwrap_or_else(|| suggest(&name, names())),
     })
 }
 
@@ -88,9 +94,13 @@ pub fn find(name_or_path: &str) -> Result<Scenario, ModelError> {
 fn meant(path: &Path) -> Option<String> {
     let here = path.parent()?;
     let stem = path.file_stem()?.to_str()?;
+    if stem.len() > LONGEST {
+        return None;
+    }
     let in_folder = model_files(here).into_iter().filter_map(|file| {
-        let shown = here.join(&file).display().to_string();
-        Some((file.strip_suffix(SUFFIX)?.to_owned(), shown))
+        let other = here.join(&file);
+        let stem = file.strip_suffix(SUFFIX)?.to_owned();
+        (other != path).then(|| (stem, other.display().to_string()))
     });
     let built_in = names().map(|name| (name.to_owned(), name.to_owned()));
     // Of two that are as near, the first is meant.
@@ -116,9 +126,9 @@ fn model_files(folder: &Path) -> Vec<String> {
     let mut files: Vec<String> = std::fs::read_dir(folder)
         .into_iter()
         .flatten()
-        .take(10_000)
+        .take(MOST_FILES)
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .filter(|name| name.ends_with(SUFFIX) && !name.chars().any(char::is_control))
+        .filter(|name| name.ends_with(SUFFIX) && !name.contains(is_unseen))
         .collect();
     files.sort();
     files

@@ -8,10 +8,14 @@ use super::Scenario;
 use super::file::ModelFile;
 use super::locate::locate;
 use super::resolve::resolve;
+use crate::files::read as read_file;
 use crate::model::{Fault, ModelError, Place, error, suggest};
 
 /// Version of the file format that [`read`] reads.
 const FORMAT: u64 = 1;
+
+/// Longest model file that is read, MiB.
+const MOST_MEBIBYTES: u64 = 8;
 
 /// Reads a scenario from the text of a model file; `origin` says in errors where the text is from.
 ///
@@ -50,7 +54,7 @@ pub fn read(text: &str, origin: &str) -> Result<Scenario, ModelError> {
 /// If the file cannot be opened, is not UTF-8 text, or is not a valid model; see [`read`].
 pub fn load(path: &Path) -> Result<Scenario, ModelError> {
     let origin = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|error| ModelError {
+    let bytes = read_file(path, MOST_MEBIBYTES).map_err(|error| ModelError {
         origin: origin.as_str().into(),
         text: "".into(),
         place: None,

@@ -10,7 +10,7 @@ use super::file_value::{Ends, OneOrMany, Sides, Where};
 use super::*;
 use crate::model::error::{Fault, Path};
 use crate::model::map::{self, Map};
-use crate::model::validate::check_names;
+use crate::model::validate::{MOST_DIMENSIONS, at_most, check_names};
 use crate::model::*;
 
 /// Builds the scenario and validates it; faults are placed where the file says the thing.
@@ -45,13 +45,19 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
     };
     check_names(&names.state, &names.modes, &names.actions)?;
     let motion = motion(&file)?;
+    let controls = motion.b.ncols();
+    at_most(
+        controls,
+        MOST_DIMENSIONS,
+        "controls",
+        Path::new("motion").key("B"),
+    )?;
     let (reward_lines, rewards) = numbered(&file.reward, "reward", |table, path| {
         names.rewards(table, path)
     })?;
     let (event_lines, events) = numbered(&file.event, "event", |table, path| {
         names.events(table, path)
     })?;
-    let controls = motion.b.ncols();
     let truth = Truth {
         simulator: simulator(&file)?,
         walls: file.world.walls,
@@ -361,10 +367,14 @@ fn numbered<T, U>(
     key: &str,
     resolve: impl Fn(&T, &Path) -> Result<Vec<U>, Fault>,
 ) -> Result<(Vec<usize>, Vec<U>), Fault> {
+    /// Most of them; where a map has many marks, a single table stands for as many.
+    const MOST: usize = 100_000;
     let mut lines = Vec::new();
     let mut items = Vec::new();
     for (i, table) in tables.iter().enumerate() {
-        let resolved = resolve(table, &Path::new(key).index(i))?;
+        let path = Path::new(key).index(i);
+        let resolved = resolve(table, &path)?;
+        at_most(items.len() + resolved.len(), MOST, "boxes in all", path)?;
         lines.extend(resolved.iter().map(|_| i));
         items.extend(resolved);
     }
@@ -449,8 +459,16 @@ fn motion(file: &ModelFile) -> Result<Motion, Fault> {
         }
         plant.validate(&Path::new("world").key("cart-pole"))?;
         let (a, b) = plant.discretised();
-        let noise =
-            optional_matrix(&table.noise, path("noise"))?.unwrap_or_else(|| plant.motion_noise());
+        let noise = plant.motion_noise();
+        let mut entries = a.iter().chain(b.iter()).chain(noise.iter());
+        if !entries.all(|entry| entry.is_finite()) {
+            return Err(Fault::new(
+                Path::new("world").key("cart-pole"),
+                "near upright, this plant moves farther in a step than numbers reach",
+                "give a shorter `step`, or masses, lengths and a gravity nearer to 1",
+            ));
+        }
+        let noise = optional_matrix(&table.noise, path("noise"))?.unwrap_or(noise);
         return Ok(Motion { a, b, noise });
     }
     let needed = |key: &str, rows: &Option<Rows>| {

@@ -83,6 +83,7 @@ impl Robot {
             ));
         }
         self.check_model(&scenario.model)?;
+        self.check_ticks(&scenario.model, path)?;
         self.check_room(&scenario.model, path)?;
         self.check_starts(scenario)
     }
@@ -115,6 +116,24 @@ impl Robot {
             ));
         }
         Ok(())
+    }
+
+    /// An action takes a number of ticks that ends.
+    fn check_ticks(&self, model: &Model, path: impl Fn(&str) -> Path) -> Result<(), Fault> {
+        const MOST: f64 = 1e5;
+        let way = |action| model.displacement(action).norm() * self.cell;
+        let longest = (0..model.actions.len()).map(way).fold(0.0, f64::max);
+        // Half a turn, and the way at half the speed.
+        let seconds = (std::f64::consts::PI * self.axle + 2.0 * longest) / self.speed + 1.0;
+        let ticks = seconds / self.tick;
+        if ticks <= MOST {
+            return Ok(());
+        }
+        Err(Fault::new(
+            path("tick"),
+            format!("an action would take up to {ticks:e} commands to the wheels"),
+            format!("give a longer tick, or more `speed`: at most {MOST:e} are carried out"),
+        ))
     }
 
     /// There is room for the body and for one step of every action, and a wall in sight from everywhere.

@@ -1,9 +1,13 @@
 //! What a policy earns, with its standard error.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use serde::{Deserialize, Serialize};
 
+use super::estimate::{Estimate, Moments};
 use super::{Agent, Episode, FilterAgent, run_episode};
 use crate::belief::Filter;
+use crate::error::{Error, Result};
 use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::Policy;
@@ -28,32 +32,6 @@ impl Default for Options {
     }
 }
 
-/// A mean with its standard error.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
-    /// Mean over episodes.
-    pub mean: f64,
-    /// Standard error of the mean; 0 for a single episode.
-    pub stderr: f64,
-}
-
-impl Estimate {
-    /// Mean and standard error of a sample, summed in its order.
-    pub fn of(sample: impl ExactSizeIterator<Item = f64> + Clone) -> Self {
-        let count = sample.len() as f64;
-        let mean = sample.clone().sum::<f64>() / count;
-        let squares: f64 = sample.map(|value| (value - mean) * (value - mean)).sum();
-        Self {
-            mean,
-            stderr: if count > 1.0 {
-                (squares / (count - 1.0) / count).sqrt()
-            } else {
-                0.0
-            },
-        }
-    }
-}
-
 /// What a policy earned.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
@@ -67,12 +45,43 @@ pub struct Evaluation {
     pub steps: Estimate,
     /// Share of episodes that ended in failure.
     pub failed: f64,
+    /// Where the agent no longer had a belief; the numbers above then say little.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lost: Option<Lost>,
+}
+
+/// A belief whose mean was no longer finite: the state, or the filter's own numbers, had grown beyond every number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Lost {
+    /// Number of the first episode in which it happened, from 0.
+    pub episode: u64,
+    /// Steps of that episode until then.
+    pub step: usize,
+    /// Episodes in which it happened. They count as ended there.
+    pub episodes: u64,
+}
+
+impl Evaluation {
+    /// Whether every belief was one, so that the numbers say what the policy earns.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] with the first episode and step at which one was not.
+    pub fn check(&self) -> Result<()> {
+        match self.lost {
+            None => Ok(()),
+            Some(Lost { episode, step, .. }) => Err(Error::Lost { episode, step }),
+        }
+    }
 }
 
 /// Discounted return of one policy less that of another, over the same episodes.
 pub type Difference = Estimate;
 
+/// Episodes that a thread runs at a time.
 const CHUNK: usize = 64;
+
+/// Chunks whose episodes are kept until they are counted, in order.
+const CHUNKS: usize = 1024;
 
 /// Runs the policy in the scenario's world. The same numbers for any number of threads.
 pub fn evaluate(
@@ -82,22 +91,13 @@ pub fn evaluate(
     options: Options,
     observer: &dyn Observer,
 ) -> Evaluation {
-    summarise(&episodes(
-        scenario,
-        &|| Box::new(FilterAgent::new(filter, policy)),
-        options,
-        observer,
-    ))
-}
-
-/// As [`evaluate`], for agents of any make.
-pub fn evaluate_agents<'a>(
-    scenario: &Scenario,
-    agent: &(dyn Fn() -> Box<dyn Agent + 'a> + Sync),
-    options: Options,
-    observer: &dyn Observer,
-) -> Evaluation {
-    summarise(&episodes(scenario, agent, options, observer))
+    summarise(options, observer, &|| {
+        episodes(
+            scenario,
+            Box::new(FilterAgent::new(filter, policy)),
+            options,
+        )
+    })
 }
 
 /// Discounted return of `first` less that of `second` in the same worlds with the same noise, a paired comparison.
@@ -109,78 +109,111 @@ pub fn compare(
     options: Options,
     observer: &dyn Observer,
 ) -> Difference {
-    let run = |policy| {
-        episodes(
-            scenario,
-            &|| Box::new(FilterAgent::new(filter, policy)),
-            options,
-            observer,
-        )
+    let mut difference = Moments::default();
+    let runner = || {
+        let [mut first, mut second] = [first, second].map(|policy| {
+            let agent = Box::new(FilterAgent::new(filter, policy));
+            episodes(scenario, agent, options)
+        });
+        Box::new(move |episode| first(episode).discounted - second(episode).discounted) as Runner<_>
     };
-    let (first, second) = (run(first), run(second));
-    Estimate::of(
-        first
-            .iter()
-            .zip(&second)
-            .map(|(a, b)| a.discounted - b.discounted),
-    )
-}
-
-fn episodes<'a>(
-    scenario: &Scenario,
-    agent: &(dyn Fn() -> Box<dyn Agent + 'a> + Sync),
-    options: Options,
-    observer: &dyn Observer,
-) -> Vec<Episode> {
-    let model = &scenario.model;
-    let limits = (model.episode.length, model.discount);
-    run_all(options, observer, &|| {
-        let mut world = ProblemWorld::new(scenario);
-        let mut agent = agent();
-        let mut observation = vec![0.0; model.observation_dim()];
-        Box::new(move |episode| {
-            run_episode(
-                &mut world,
-                agent.as_mut(),
-                &mut Draws::new(options.seed, episode),
-                &mut observation,
-                limits,
-                &mut |_, _| {},
-            )
-        })
-    })
+    run_all(
+        options.episodes,
+        "episodes",
+        observer,
+        &runner,
+        &mut |gain| difference.add(gain),
+    );
+    difference.estimate()
 }
 
 /// Something that runs the episode of a number.
-pub(crate) type Runner<'a> = Box<dyn FnMut(u64) -> Episode + 'a>;
+pub(crate) type Runner<'a, T> = Box<dyn FnMut(u64) -> T + 'a>;
 
-/// Runs all episodes, in chunks that each have a runner of their own.
-pub(crate) fn run_all<'a>(
+/// Runs an agent in a scenario's world.
+fn episodes<'a>(
+    scenario: &'a Scenario,
+    mut agent: Box<dyn Agent + 'a>,
     options: Options,
-    observer: &dyn Observer,
-    runner: &(dyn Fn() -> Runner<'a> + Sync),
-) -> Vec<Episode> {
-    let chunks = options.episodes.div_ceil(CHUNK);
-    let done = std::sync::atomic::AtomicU64::new(0);
-    parallel::map(chunks, |chunk| {
-        let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(options.episodes);
-        let count = range.len() as u64;
-        let mut run = runner();
-        let episodes: Vec<Episode> = range.map(|episode| run(episode as u64)).collect();
-        let done = done.fetch_add(count, std::sync::atomic::Ordering::Relaxed) + count;
-        observer.progress("episodes", done, options.episodes as u64);
-        episodes
+) -> Runner<'a, Episode> {
+    let model = &scenario.model;
+    let limits = (model.episode.length, model.discount);
+    let mut world = ProblemWorld::new(scenario);
+    let mut observation = vec![0.0; model.observation_dim()];
+    Box::new(move |episode| {
+        run_episode(
+            &mut world,
+            agent.as_mut(),
+            &mut Draws::new(options.seed, episode),
+            &mut observation,
+            limits,
+            &mut |_, _| {},
+        )
     })
-    .concat()
 }
 
-pub(crate) fn summarise(episodes: &[Episode]) -> Evaluation {
+/// Runs so many episodes, in chunks that each have a runner of their own, and hands over what comes of them, in order. However many
+/// they are, few are kept at a time.
+pub(crate) fn run_all<'a, T: Send>(
+    episodes: usize,
+    stage: &'static str,
+    observer: &dyn Observer,
+    runner: &(dyn Fn() -> Runner<'a, T> + Sync),
+    take: &mut dyn FnMut(T),
+) {
+    let done = AtomicU64::new(0);
+    let mut from = 0;
+    while from < episodes {
+        let count = (episodes - from).min(CHUNK * CHUNKS);
+        let wave = parallel::map(count.div_ceil(CHUNK), |chunk| {
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
+            let size = range.len() as u64;
+            let mut run = runner();
+            let results: Vec<T> = range.map(|episode| run((from + episode) as u64)).collect();
+            let done = done.fetch_add(size, Ordering::Relaxed) + size;
+            observer.progress(stage, done, episodes as u64);
+            results
+        });
+        wave.into_iter().flatten().for_each(&mut *take);
+        from += count;
+    }
+}
+
+/// Runs all episodes, and what they earned.
+pub(crate) fn summarise<'a>(
+    options: Options,
+    observer: &dyn Observer,
+    runner: &(dyn Fn() -> Runner<'a, Episode> + Sync),
+) -> Evaluation {
+    let [mut discounted, mut undiscounted, mut steps] = [Moments::default(); 3];
+    let (mut failed, mut lost): (u64, Option<Lost>) = (0, None);
+    run_all(
+        options.episodes,
+        "episodes",
+        observer,
+        runner,
+        &mut |episode: Episode| {
+            if episode.lost {
+                let number = discounted.count();
+                let first = Lost {
+                    episode: number,
+                    step: episode.steps,
+                    episodes: 0,
+                };
+                lost.get_or_insert(first).episodes += 1;
+            }
+            discounted.add(episode.discounted);
+            undiscounted.add(episode.undiscounted);
+            steps.add(episode.steps as f64);
+            failed += u64::from(episode.failed);
+        },
+    );
     Evaluation {
-        episodes: episodes.len(),
-        discounted: Estimate::of(episodes.iter().map(|episode| episode.discounted)),
-        undiscounted: Estimate::of(episodes.iter().map(|episode| episode.undiscounted)),
-        steps: Estimate::of(episodes.iter().map(|episode| episode.steps as f64)),
-        failed: episodes.iter().filter(|episode| episode.failed).count() as f64
-            / episodes.len() as f64,
+        episodes: options.episodes,
+        discounted: discounted.estimate(),
+        undiscounted: undiscounted.estimate(),
+        steps: steps.estimate(),
+        failed: failed as f64 / options.episodes as f64,
+        lost,
     }
 }

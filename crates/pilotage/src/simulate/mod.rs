@@ -1,13 +1,15 @@
 //! Running policies in worlds, and what they earn.
 
 mod agent;
+mod estimate;
 mod evaluate;
 mod life;
 pub mod wake_up;
 
 pub use agent::{Agent, FilterAgent};
-pub use evaluate::{Difference, Estimate, Evaluation, Options, compare, evaluate, evaluate_agents};
-pub(crate) use evaluate::{run_all, summarise};
+pub use estimate::Estimate;
+pub(crate) use evaluate::summarise;
+pub use evaluate::{Difference, Evaluation, Lost, Options, compare, evaluate};
 pub use life::{Life, LifeOptions, Run, life};
 
 use crate::model::{ActionId, Then};
@@ -24,6 +26,8 @@ pub struct Episode {
     pub steps: usize,
     /// Whether it ended in failure.
     pub failed: bool,
+    /// Whether it ended because the mean of the agent's belief was no longer finite.
+    pub lost: bool,
 }
 
 /// One step of an episode, as a watcher sees it.
@@ -47,8 +51,8 @@ pub struct Moment<'a> {
 
 /// Runs one episode of at most `length` steps. `observation` is a buffer for the sensor's `m` readings.
 ///
-/// The order is that of POMDPs.jl: stop if the episode is over, act, collect the discounted reward, then update the belief. What ending costs is
-/// paid after the last step.
+/// The order is that of POMDPs.jl: stop if the episode is over, act, collect the discounted reward, then update the belief. An agent
+/// whose belief is no longer finite has nothing to act on: the episode ends there. What ending costs is paid after the last step.
 pub fn run_episode(
     world: &mut dyn World,
     agent: &mut dyn Agent,
@@ -64,6 +68,7 @@ pub fn run_episode(
         undiscounted: 0.0,
         steps: 0,
         failed: false,
+        lost: false,
     };
     let mut weight = 1.0;
     while episode.steps < length {
@@ -90,6 +95,10 @@ pub fn run_episode(
         episode.steps += 1;
         if step.then == Then::End {
             episode.failed = step.failed;
+            break;
+        }
+        if agent.belief().mean.iter().any(|m| !m.is_finite()) {
+            episode.lost = true;
             break;
         }
     }

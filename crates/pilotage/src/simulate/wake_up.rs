@@ -6,12 +6,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::estimate::Moments;
+use super::evaluate::{Runner, run_all};
 use super::{Agent, Estimate, FilterAgent, run_episode};
 use crate::belief::{Belief, BeliefMdp, Filter, Tracker, Tracking};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Region};
 use crate::observe::Observer;
-use crate::parallel;
 use crate::policy::Policy;
 use crate::scenario::{Scenario, Truth};
 use crate::world::{Draws, ProblemWorld};
@@ -53,6 +54,7 @@ impl Default for Settings {
 }
 
 /// An agent that follows several hypotheses and a policy for a single one.
+#[derive(Clone)]
 pub struct WakeUpAgent<'a> {
     tracker: Tracker,
     policy: &'a dyn Policy,
@@ -219,7 +221,7 @@ pub struct WakeUp {
     pub told: Reached,
     /// Success of the lost agent as a share of the told one's, with its standard error (paired, delta method).
     pub ratio: Estimate,
-    /// Kidnappings after which one hypothesis was left, by the steps that took, from 0 to the step limit.
+    /// Kidnappings after which one hypothesis was left, by the steps that took, from 0 to the most that it took.
     pub alone_after: Vec<usize>,
     /// Kidnappings in which several were left in the end.
     pub never_alone: usize,
@@ -230,6 +232,8 @@ pub struct WakeUp {
 struct Run {
     reached: Option<usize>,
     discounted: f64,
+    /// Steps after which there was no belief any more.
+    beliefless: Option<usize>,
 }
 
 /// Both agents after one kidnapping, and what was left of the hypotheses.
@@ -239,13 +243,11 @@ struct Pair {
     alone: Option<usize>,
 }
 
-const CHUNK: usize = 32;
-
 /// Kidnaps the agent over and over, in a world with such a truth. The truth is one of the start hypotheses, drawn by weight. The same numbers for any number of threads.
 ///
 /// # Errors
 /// [`Error::Unsupported`] for a model with one start, or without anything good to reach; [`Error::Setting`] for settings out of
-/// range.
+/// range; [`Error::Lost`] where an agent's belief is no longer finite.
 pub fn measure(
     mdp: &BeliefMdp,
     truth: &Truth,
@@ -255,52 +257,45 @@ pub fn measure(
 ) -> Result<WakeUp> {
     let goals = mdp.model().goals();
     check(mdp, &goals, settings)?;
-    WakeUpAgent::new(mdp, policy, settings.tracking, settings.choice)?;
+    mdp.levels().check(mdp.model())?;
+    let agent = WakeUpAgent::new(mdp, policy, settings.tracking, settings.choice)?;
     let told: Vec<Filter> = mdp
         .starts()
         .iter()
         .map(|(_, start)| mdp.filter_from(start))
         .collect();
-    let model = mdp.model();
     // It wakes up where it believes it may be, wherever else an episode would start.
     let scenario = Scenario {
-        model: model.clone(),
+        model: mdp.model().clone(),
         truth: Truth {
             start: None,
             ..truth.clone()
         },
     };
-    let done = std::sync::atomic::AtomicU64::new(0);
-    let chunks = parallel::map(settings.episodes.div_ceil(CHUNK), |chunk| {
-        let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(settings.episodes);
-        let count = range.len() as u64;
-        let mut world = ProblemWorld::new(&scenario);
-        let mut lost = WakeUpAgent::new(mdp, policy, settings.tracking, settings.choice)?;
-        let pairs: Vec<Pair> = range
-            .map(|episode| {
-                let draws = || Draws::new(settings.seed, episode as u64);
-                let of_lost = run(&mut world, &mut lost, draws(), &goals, model);
-                let truth = world.hypothesis();
-                let mut knows = FilterAgent::new(&told[truth], policy);
-                let of_told = run(&mut world, &mut knows, draws(), &goals, model);
-                Pair {
-                    lost: of_lost,
-                    told: of_told,
-                    alone: lost.alone(),
-                }
-            })
-            .collect();
-        let done = done.fetch_add(count, std::sync::atomic::Ordering::Relaxed) + count;
-        observer.progress("kidnappings", done, settings.episodes as u64);
-        Ok(pairs)
-    });
-    let pairs: Vec<Pair> = chunks
-        .into_iter()
-        .collect::<Result<Vec<Vec<Pair>>>>()?
-        .into_iter()
-        .flatten()
-        .collect();
-    Ok(summarise(&pairs, model.episode.length))
+    let mut tally = Tally::default();
+    let runner = || {
+        let (goals, told, scenario) = (&goals, &told, &scenario);
+        let mut world = ProblemWorld::new(scenario);
+        let mut lost = agent.clone();
+        Box::new(move |episode| {
+            let draws = || Draws::new(settings.seed, episode);
+            let of_lost = run(&mut world, &mut lost, draws(), goals, &scenario.model);
+            let mut knows = FilterAgent::new(&told[world.hypothesis()], policy);
+            Pair {
+                lost: of_lost,
+                told: run(&mut world, &mut knows, draws(), goals, &scenario.model),
+                alone: lost.alone(),
+            }
+        }) as Runner<_>
+    };
+    run_all(
+        settings.episodes,
+        "kidnappings",
+        observer,
+        &runner,
+        &mut |pair| tally.take(&pair),
+    );
+    tally.summary()
 }
 
 fn check(mdp: &BeliefMdp, goals: &[Region], settings: &Settings) -> Result<()> {
@@ -345,43 +340,96 @@ fn run(
     Run {
         reached,
         discounted: episode.discounted,
+        beliefless: episode.lost.then_some(episode.steps),
     }
 }
 
-fn summarise(pairs: &[Pair], length: usize) -> WakeUp {
-    let reached = |run: fn(&Pair) -> Run| {
-        let steps: Vec<f64> = pairs
-            .iter()
-            .filter_map(|pair| run(pair).reached.map(|steps| steps as f64))
-            .collect();
-        Reached {
-            success: Estimate::of(
-                pairs
-                    .iter()
-                    .map(|pair| f64::from(run(pair).reached.is_some())),
-            ),
-            steps: (!steps.is_empty()).then(|| Estimate::of(steps.iter().copied())),
-            discounted: Estimate::of(pairs.iter().map(|pair| run(pair).discounted)),
+/// What is kept of one agent's kidnappings.
+#[derive(Debug, Default)]
+struct Account {
+    success: Moments,
+    steps: Moments,
+    discounted: Moments,
+}
+
+impl Account {
+    fn take(&mut self, run: Run) {
+        self.success.add(f64::from(run.reached.is_some()));
+        if let Some(steps) = run.reached {
+            self.steps.add(steps as f64);
         }
-    };
-    let (lost, told) = (reached(|pair| pair.lost), reached(|pair| pair.told));
-    let ratio = lost.success.mean / told.success.mean;
-    let missed = Estimate::of(pairs.iter().map(|pair| {
-        f64::from(pair.lost.reached.is_some()) - ratio * f64::from(pair.told.reached.is_some())
-    }));
-    let mut alone_after = vec![0; length + 1];
-    for steps in pairs.iter().filter_map(|pair| pair.alone) {
-        alone_after[steps] += 1;
+        self.discounted.add(run.discounted);
     }
-    WakeUp {
-        episodes: pairs.len(),
-        ratio: Estimate {
-            mean: ratio,
-            stderr: missed.stderr / told.success.mean,
-        },
-        lost,
-        told,
-        alone_after,
-        never_alone: pairs.iter().filter(|pair| pair.alone.is_none()).count(),
+
+    fn summary(&self) -> Reached {
+        Reached {
+            success: self.success.estimate(),
+            steps: (self.steps.count() > 0).then(|| self.steps.estimate()),
+            discounted: self.discounted.estimate(),
+        }
+    }
+}
+
+/// What is kept of all kidnappings.
+#[derive(Debug, Default)]
+struct Tally {
+    lost: Account,
+    told: Account,
+    /// Kidnappings in which both reached a goal.
+    both: u64,
+    alone_after: Vec<usize>,
+    never_alone: usize,
+    /// First kidnapping and step after which an agent no longer had a belief.
+    beliefless: Option<(u64, usize)>,
+}
+
+impl Tally {
+    fn take(&mut self, pair: &Pair) {
+        for run in [pair.lost, pair.told] {
+            if let Some(step) = run.beliefless {
+                self.beliefless
+                    .get_or_insert((self.lost.success.count(), step));
+            }
+        }
+        self.lost.take(pair.lost);
+        self.told.take(pair.told);
+        self.both += u64::from(pair.lost.reached.is_some() && pair.told.reached.is_some());
+        match pair.alone {
+            None => self.never_alone += 1,
+            Some(steps) => {
+                if self.alone_after.len() <= steps {
+                    self.alone_after.resize(steps + 1, 0);
+                }
+                self.alone_after[steps] += 1;
+            }
+        }
+    }
+
+    fn summary(self) -> Result<WakeUp> {
+        if let Some((episode, step)) = self.beliefless {
+            return Err(Error::Lost { episode, step });
+        }
+        let (lost, told) = (self.lost.summary(), self.told.summary());
+        let ratio = lost.success.mean / told.success.mean;
+        let count = self.lost.success.count() as f64;
+        // Sum of the squares of `lost - ratio told`, whose own sum is 0.
+        let squares = count * (lost.success.mean + ratio * ratio * told.success.mean)
+            - 2.0 * ratio * self.both as f64;
+        let missed = if count > 1.0 {
+            (squares.max(0.0) / (count - 1.0) / count).sqrt()
+        } else {
+            0.0
+        };
+        Ok(WakeUp {
+            episodes: self.lost.success.count() as usize,
+            ratio: Estimate {
+                mean: ratio,
+                stderr: missed / told.success.mean,
+            },
+            lost,
+            told,
+            alone_after: self.alone_after,
+            never_alone: self.never_alone,
+        })
     }
 }

@@ -64,9 +64,14 @@ pub struct Axis {
 impl Axis {
     /// `count` points from `low` to `high`, both included.
     pub fn new(low: f64, high: f64, count: usize) -> Self {
+        Self::stepped(low, (high - low) / (count - 1) as f64, count)
+    }
+
+    /// `count` points, a step apart, the first of them `low`.
+    pub const fn stepped(low: f64, step: f64, count: usize) -> Self {
         Self {
             low,
-            step: (high - low) / (count - 1) as f64,
+            step,
             count,
             lattice: None,
         }
@@ -96,16 +101,6 @@ impl Axis {
             step,
             count: (before + after) as usize + 1,
             lattice: Some((place, before as usize, length, parts as usize)),
-        }
-    }
-
-    /// `count` points from `low` on, so far apart.
-    pub fn stepping(low: f64, step: f64, count: usize) -> Self {
-        Self {
-            low,
-            step,
-            count,
-            lattice: None,
         }
     }
 

@@ -175,14 +175,10 @@ impl StateMdp {
         let next = match outcome.then {
             Then::End => Next::End,
             Then::Restart => Next::Restart,
-            Then::Continue => {
-                let centre = &model.motion.a * DVector::from_column_slice(state)
-                    + model.displacement(action);
-                Next::Continue {
-                    mode: outcome.mode,
-                    centre: self.belief_mdp.stop(state, centre).as_slice().to_vec(),
-                }
-            }
+            Then::Continue => Next::Continue {
+                mode: outcome.mode,
+                centre: self.belief_mdp.predicted(state, action).as_slice().to_vec(),
+            },
         };
         Entry { reward, next }
     }

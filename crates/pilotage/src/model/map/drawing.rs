@@ -7,6 +7,9 @@ use super::{Cell, Grid, Map};
 const CHARACTERS: &str = "`#` is blocked, `.` free, a letter, digit or `*` a mark";
 const WALLED: &str = "draw `+` at every corner, `-` and `|` for walls, blanks where there is none";
 
+/// Most characters of a drawing.
+const MOST_CHARACTERS: usize = 250_000;
+
 /// Reads a drawing with cells of side `cell`; a fault points to its row and column.
 pub(crate) fn draw(text: &str, cell: f64) -> Result<Map, Fault> {
     if !(cell.is_finite() && cell > 0.0) {
@@ -29,6 +32,13 @@ pub(crate) fn draw(text: &str, cell: f64) -> Result<Map, Fault> {
                 rows[row].len()
             ),
             "make all rows equally long; blanks at the end of a row count",
+        ));
+    }
+    if rows.len() * width > MOST_CHARACTERS {
+        return Err(Fault::new(
+            drawing(),
+            format!("the drawing has {} characters", rows.len() * width),
+            format!("draw at most {MOST_CHARACTERS}"),
         ));
     }
     let cells = if rows[0][0] == '+' {

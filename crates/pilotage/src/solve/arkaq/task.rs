@@ -39,6 +39,7 @@ impl<'a> Task<'a> {
             });
         }
         let mdp = BeliefMdp::new(&known(model));
+        mdp.levels().check(mdp.model())?;
         mdp.levels().check_bounded(mdp.model())?;
         Ok(Self {
             filter: mdp.filter(),

@@ -280,7 +280,7 @@ impl<'a> Planner<'a> {
         let (reached, late) = reach(&levels, restarts(frame.model));
         let mut planner = Self {
             ceiling: Ceiling::new(frame.model),
-            lattice: [Axis::stepping(0.0, 1.0, 1); 2],
+            lattice: [Axis::stepped(0.0, 1.0, 1); 2],
             frame,
             effects,
             reached,
@@ -339,7 +339,7 @@ impl<'a> Planner<'a> {
     /// About so many points, a whole number of them to every displacement if that can be.
     fn axis(&self, i: usize, count: usize) -> Axis {
         if !self.frame.is_real(i) {
-            return Axis::stepping(0.0, 1.0, 1);
+            return Axis::stepped(0.0, 1.0, 1);
         }
         let AxisModel { displacement, .. } = &self.frame.axes[i];
         let core = self.frame.core(i);
@@ -358,7 +358,7 @@ impl<'a> Planner<'a> {
             Some(measure) if measure >= coarse => measure / (measure / coarse).ceil(),
             _ => coarse,
         };
-        Axis::stepping(low, step, (width / step).ceil() as usize + 1)
+        Axis::stepped(low, step, (width / step).ceil() as usize + 1)
     }
 
     fn index(&self, mode: ModeId, level: usize) -> usize {

@@ -113,7 +113,7 @@ fn half_square(x: f64, sd: f64) -> f64 {
 /// apart.
 pub(super) fn kernel(sd: f64, step: f64) -> Vec<f64> {
     let reach = (9.0 * sd / step).ceil() as usize + 1;
-    let axis = Axis::stepping(-(reach as f64) * step, step, 2 * reach + 1);
+    let axis = Axis::stepped(-(reach as f64) * step, step, 2 * reach + 1);
     Law::normal(0.0, sd).hats(&axis)
 }
 

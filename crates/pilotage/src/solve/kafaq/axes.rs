@@ -50,6 +50,10 @@ pub(super) fn axes(model: &Model) -> Option<Coordinates> {
 fn left_eigenvector(a: &DMatrix<f64>, value: f64) -> Option<Vec<f64>> {
     let n = a.nrows();
     let shifted = a.transpose() - DMatrix::identity(n, n) * value;
+    // No decomposition of a matrix that is not finite comes to an end.
+    if shifted.iter().any(|entry| !entry.is_finite()) {
+        return None;
+    }
     let decomposition = shifted.svd(false, true);
     let vectors = decomposition.v_t?;
     let row = vectors.row(decomposition.singular_values.imin());

@@ -36,6 +36,7 @@ impl<'a> Task<'a> {
         settings.validate()?;
         let fingerprint = model.fingerprint();
         let mdp = BeliefMdp::new(&known(model));
+        mdp.levels().check(mdp.model())?;
         let refuse = |reason: String| Error::Unsupported {
             solver: SOLVER,
             model: model.name.clone(),

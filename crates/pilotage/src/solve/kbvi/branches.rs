@@ -123,7 +123,7 @@ struct Search<'a> {
     settings: &'a Settings,
     /// The true state, where the case fixes it.
     case: Option<&'a DVector<f64>>,
-    displacements: Vec<DVector<f64>>,
+    actions: usize,
     /// `discount^t`, and the least and the most that steps `t..=horizon` can earn, by `t`.
     weights: Vec<f64>,
     bounds: Vec<(f64, f64)>,
@@ -178,10 +178,7 @@ impl<'a> Search<'a> {
             mdp,
             settings,
             case,
-            displacements: actions
-                .clone()
-                .map(|action| model.displacement(action))
-                .collect(),
+            actions: model.actions.len(),
             weights,
             bounds,
             outlooks: Vec::new(),
@@ -281,8 +278,8 @@ impl<'a> Search<'a> {
             Some(&Worth::AtMost(value)) if value <= floor => return value,
             _ => {}
         }
-        let mut promising: Vec<(f64, ActionId)> = Vec::with_capacity(self.displacements.len());
-        for action in 0..self.displacements.len() {
+        let mut promising: Vec<(f64, ActionId)> = Vec::with_capacity(self.actions);
+        for action in 0..self.actions {
             let alike = self.earns_like[at.mode][action];
             let reward = if alike < action {
                 promising[alike].0
@@ -317,8 +314,7 @@ impl<'a> Search<'a> {
             return then;
         }
         let class = self.mdp.levels().class_of(action);
-        let moved = &model.motion.a * &at.mean + &self.displacements[action];
-        let mut mean = self.mdp.stop(at.mean.as_slice(), moved);
+        let mut mean = self.mdp.predicted(at.mean.as_slice(), action);
         if let Some(point) = self.case {
             let step = self
                 .mdp

@@ -8,10 +8,13 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::policy::write_whole;
+use crate::files::{self, write_whole};
 
 /// Version of the file format.
 const FORMAT: u32 = 1;
+
+/// Longest checkpoint that is read, MiB.
+const MOST_MEBIBYTES: u64 = 1024;
 
 #[derive(Serialize, Deserialize)]
 struct Header<S> {
@@ -59,14 +62,19 @@ impl<S: Clone + PartialEq + Serialize + DeserializeOwned> Owner<'_, S> {
 
     /// Reads the state of a run of this owner.
     pub fn load<T: DeserializeOwned>(&self, path: &Path) -> Result<T> {
-        let bytes = std::fs::read(path).map_err(|source| Error::Io {
+        let refuse = |reason: String| Error::Checkpoint {
+            path: path.to_owned(),
+            reason,
+        };
+        if !path.is_file() {
+            let reason = "a checkpoint is read and written again and again, and this is no file; give the name of one";
+            return Err(refuse(reason.to_owned()));
+        }
+        let bytes = files::read(path, MOST_MEBIBYTES).map_err(|source| Error::Io {
             path: path.to_owned(),
             source,
         })?;
-        self.read(&bytes).map_err(|reason| Error::Checkpoint {
-            path: path.to_owned(),
-            reason,
-        })
+        self.read(&bytes).map_err(refuse)
     }
 
     fn read<T: DeserializeOwned>(&self, bytes: &[u8]) -> std::result::Result<T, String> {

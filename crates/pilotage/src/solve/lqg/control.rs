@@ -9,8 +9,11 @@ use crate::error::{Error, Result};
 use crate::model::{Model, QuadraticCost};
 use crate::observe::Observer;
 use crate::scenario::{Scenario, Simulator, Walls};
-use crate::simulate::{Episode, Evaluation, Options, run_all, summarise};
+use crate::simulate::{Episode, Evaluation, Options, summarise};
 use crate::world::{Draws, Noise, ProblemWorld, World};
+
+/// Most steps of an episode that gains are kept for.
+const MOST_STEPS: usize = 100_000;
 
 /// The gains of every step of an episode, of the control and of the filter.
 #[derive(Debug, Clone)]
@@ -37,7 +40,7 @@ impl Controller {
     /// cost is paid after the last step.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] without a cost, [`Error::NotPositiveDefinite`] where some control costs nothing, now or later.
+    /// [`Error::Unsupported`] without a cost or for an episode of more than 100,000 steps, [`Error::NotPositiveDefinite`] where some control costs nothing, now or later.
     pub fn new(mdp: &BeliefMdp) -> Result<Self> {
         let model = mdp.model();
         let Some(cost) = model.cost.clone() else {
@@ -49,6 +52,15 @@ impl Controller {
         };
         let (a, b, discount) = (&model.motion.a, &model.motion.b, model.discount);
         let length = model.episode.length;
+        if length > MOST_STEPS {
+            return Err(Error::Unsupported {
+                solver: "lqg",
+                model: model.name.clone(),
+                reason: format!(
+                    "it keeps a gain for every step of an episode, {MOST_STEPS} at most, and this one has {length}; set `length` in [episode] lower"
+                ),
+            });
+        }
         let weights = (&cost.state, &cost.control);
         let mut stages = Vec::with_capacity(length);
         let mut next = cost.terminal.clone();
@@ -119,14 +131,14 @@ impl Controller {
             Noise::new(&self.model.motion.noise),
             Noise::new(&self.model.sensor.noise),
         );
-        Ok(summarise(&run_all(options, observer, &|| {
+        Ok(summarise(options, observer, &|| {
             let mut world = ProblemWorld::new(scenario);
             let noise = &noise;
             Box::new(move |episode| {
                 let mut draws = Draws::new(options.seed, episode);
                 self.run(&mut world, noise, &mut draws)
             })
-        })))
+        }))
     }
 
     /// One episode. The world is asked for its start only: its own steps know no free control.
@@ -147,17 +159,19 @@ impl Controller {
         let mut episode = Episode {
             discounted: 0.0,
             undiscounted: 0.0,
-            steps: self.gains.len(),
+            steps: 0,
             failed: false,
+            lost: false,
         };
         let mut weight = 1.0;
-        let mut pay = |weight: f64, cost: f64| {
+        let pay = |episode: &mut Episode, weight: f64, cost: f64| {
             episode.discounted -= weight * cost;
             episode.undiscounted -= cost;
         };
         for (gain, correction) in self.gains.iter().zip(&self.corrections) {
             let control = -(gain * &mean);
             pay(
+                &mut episode,
                 weight,
                 quadratic(&self.cost.state, &state) + quadratic(&self.cost.control, &control),
             );
@@ -168,8 +182,13 @@ impl Controller {
             sensor_noise.add_to(observation.as_mut_slice(), &mut draws.sensor);
             let predicted = a * mean + b * control;
             mean = &predicted + &correction.gain * (observation - h * &predicted);
+            episode.steps += 1;
+            if mean.iter().any(|m| !m.is_finite()) {
+                episode.lost = true;
+                return episode;
+            }
         }
-        pay(weight, quadratic(&self.cost.terminal, &state));
+        pay(&mut episode, weight, quadratic(&self.cost.terminal, &state));
         episode
     }
 }

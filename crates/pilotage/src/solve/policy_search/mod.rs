@@ -20,13 +20,16 @@ use crate::observe::Observer;
 /// Name of the solver in errors and policies.
 const SOLVER: &str = "policy-search";
 
+/// Most [`PolicySearch::effort`].
+pub const MOST_EFFORT: f64 = 1000.0;
+
 /// The planner that searches switching planes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PolicySearch {
     /// Cost of the strongest control of the actions, in units of the cost of being at a limit, for the planes it begins with; more than
     /// 0.
     pub control_weight: f64,
-    /// Factor on the length of all simulations; more than 0, and 1 is the thorough search.
+    /// Factor on the length of all simulations; more than 0, at most 1000, and 1 is the thorough search.
     pub effort: f64,
 }
 
@@ -41,13 +44,11 @@ impl Default for PolicySearch {
 
 impl Settings for PolicySearch {
     fn validate(&self) -> Result<()> {
-        for (setting, value) in [
-            ("control_weight", self.control_weight),
-            ("effort", self.effort),
-        ] {
-            ensure(setting, value, value > 0.0 && value.is_finite(), "above 0")?;
-        }
-        Ok(())
+        let (weight, effort) = (self.control_weight, self.effort);
+        let fits = weight > 0.0 && weight.is_finite();
+        ensure("control_weight", weight, fits, "above 0")?;
+        let fits = effort > 0.0 && effort <= MOST_EFFORT;
+        ensure("effort", effort, fits, "above 0, at most 1000")
     }
 }
 

@@ -1,0 +1,409 @@
+//! What careless or hostile input meets: a result or one message, never a panic, a hang or a broken file.
+#![cfg(unix)]
+#![allow(clippy::unwrap_used)]
+
+use std::ffi::OsStr;
+use std::fs;
+use std::io::Read;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// A command in a folder.
+fn pilotage(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pilotage"));
+    command.current_dir(folder).args(arguments);
+    command
+}
+
+/// A command line of the shell, in which `pilotage` is the program.
+fn shell(folder: &Path, line: &str) -> Output {
+    let binary = env!("CARGO_BIN_EXE_pilotage");
+    let script = format!("pilotage() {{ '{binary}' \"$@\"; }}\n{line}");
+    Command::new("bash")
+        .current_dir(folder)
+        .args(["-c", &script])
+        .output()
+        .unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Whether some command of the system succeeds.
+fn system(folder: &Path, command: &[&str]) -> bool {
+    let status = Command::new(command[0])
+        .current_dir(folder)
+        .args(&command[1..])
+        .status();
+    status.is_ok_and(|status| status.success())
+}
+
+/// A policy that is quickly made.
+const SOLVE: [&str; 6] = ["solve", "tiger", "--episodes", "10", "--seed", "1"];
+
+fn solve_to(folder: &Path, out: &str) -> Output {
+    let arguments = [&SOLVE[..], &["--out", out]].concat();
+    pilotage(folder, &arguments).output().unwrap()
+}
+
+fn is_policy(text: &str) -> bool {
+    text.contains("\"automaton\"")
+}
+
+/// Names of what lies in a folder.
+fn listing(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn an_output_that_is_no_file_is_written_to_or_refused_and_stays_what_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let kind = |name: &str| fs::symlink_metadata(here.join(name)).unwrap().file_type();
+
+    fs::create_dir(here.join("folder")).unwrap();
+    let refused = solve_to(here, "folder");
+    assert!(!refused.status.success());
+    assert!(text(&refused.stderr).contains("folder: this is a directory"));
+    assert!(kind("folder").is_dir());
+
+    let _socket = std::os::unix::net::UnixListener::bind(here.join("socket")).unwrap();
+    let refused = solve_to(here, "socket");
+    assert!(!refused.status.success());
+    assert!(text(&refused.stderr).contains("a device or a socket"));
+    assert!(kind("socket").is_socket());
+
+    assert!(system(here, &["mkfifo", "pipe"]));
+    let mut child = pilotage(here, &[&SOLVE[..], &["--out", "pipe"]].concat())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut piped = String::new();
+    fs::File::open(here.join("pipe"))
+        .unwrap()
+        .read_to_string(&mut piped)
+        .unwrap();
+    assert!(child.wait().unwrap().success());
+    assert!(is_policy(&piped));
+    assert!(kind("pipe").is_fifo());
+
+    // Nodes like /dev/null and /dev/loop0, which only root may make.
+    if system(here, &["mknod", "null", "c", "1", "3"]) {
+        assert!(solve_to(here, "null").status.success());
+        assert!(kind("null").is_char_device());
+    }
+    if system(here, &["mknod", "disk", "b", "7", "200"]) {
+        let refused = solve_to(here, "disk");
+        assert!(!refused.status.success());
+        assert!(text(&refused.stderr).contains("a device or a socket"));
+        assert!(kind("disk").is_block_device());
+    }
+}
+
+#[test]
+fn a_link_stays_and_what_it_leads_to_is_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::create_dir(here.join("store")).unwrap();
+    fs::write(here.join("store/policy.json"), "old").unwrap();
+    symlink("store/policy.json", here.join("link.json")).unwrap();
+    symlink("link.json", here.join("link-of-link.json")).unwrap();
+    symlink("store/new.json", here.join("dangling.json")).unwrap();
+    symlink("circle", here.join("circle")).unwrap();
+    symlink("missing/new.json", here.join("nowhere.json")).unwrap();
+    for (link, file) in [
+        ("link.json", "store/policy.json"),
+        ("link-of-link.json", "store/policy.json"),
+        ("dangling.json", "store/new.json"),
+    ] {
+        let solved = solve_to(here, link);
+        assert!(solved.status.success(), "{}", text(&solved.stderr));
+        assert!(fs::symlink_metadata(here.join(link)).unwrap().is_symlink());
+        assert!(is_policy(&fs::read_to_string(here.join(file)).unwrap()));
+        fs::write(here.join("store/policy.json"), "old").unwrap();
+    }
+    for link in ["circle", "nowhere.json"] {
+        let refused = solve_to(here, link);
+        assert!(!refused.status.success());
+        assert!(text(&refused.stderr).contains(link));
+    }
+    assert_eq!(listing(&here.join("store")), ["new.json", "policy.json"]);
+}
+
+#[test]
+fn a_file_that_is_replaced_hands_its_permissions_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("policy.json");
+    fs::write(&path, "secret").unwrap();
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
+    assert!(solve_to(folder.path(), "policy.json").status.success());
+    let mode = fs::metadata(&path).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o600);
+}
+
+#[test]
+fn a_policy_can_be_written_to_the_standard_streams() {
+    let folder = tempfile::tempdir().unwrap();
+    let solve = SOLVE.join(" ");
+    for line in [
+        format!("pilotage {solve} --out /dev/stdout"),
+        format!("pilotage {solve} --out /dev/stdout | cat"),
+        format!("pilotage {solve} --out /dev/stdout > file; cat file"),
+        format!("echo before > file; pilotage {solve} --out /dev/stdout >> file; cat file"),
+        format!("pilotage {solve} --out /dev/stderr 2>&1"),
+        format!("pilotage {solve} --out >(cat > file); sleep 0.5; cat file"),
+    ] {
+        let output = shell(folder.path(), &line);
+        let printed = text(&output.stdout);
+        assert!(output.status.success(), "{line}: {}", text(&output.stderr));
+        assert!(is_policy(&printed), "{line}");
+        assert_eq!(line.contains("before"), printed.starts_with("before"));
+        if !line.contains(">(") {
+            assert!(printed.contains("discounted return"), "{line}");
+        }
+    }
+    let full = shell(folder.path(), &format!("pilotage {solve} --out /dev/full"));
+    assert!(!full.status.success());
+    assert!(text(&full.stderr).contains("error: /dev/full"));
+}
+
+#[test]
+fn a_wrong_name_for_the_output_is_known_before_the_work_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let clock = Instant::now();
+    for wrong in ["--out=missing/p.json", "--curves=missing/p.svg", "--out=."] {
+        let hours = [
+            "solve",
+            "stations-5x5",
+            "--with",
+            "kafaq",
+            "--learn",
+            "epoch=100000000",
+            wrong,
+        ];
+        let output = pilotage(folder.path(), &hours).output().unwrap();
+        assert!(!output.status.success());
+        assert_eq!(text(&output.stderr).matches("error:").count(), 1);
+    }
+    assert!(clock.elapsed() < Duration::from_secs(10));
+}
+
+/// A learner writes its checkpoint all the time; whenever it is ended, by whatever signal, nothing else is left behind.
+#[test]
+fn signals_leave_no_temporary_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let learn = [
+        "solve",
+        "maze-4x4",
+        "--with",
+        "kafaq",
+        "--learn",
+        "epoch=100",
+        "--learn",
+        "epoch_per_cell=1",
+        "--learn",
+        "epoch_limit=100000",
+        "--checkpoint",
+        "run.json",
+    ];
+    for (round, signal) in ["TERM", "INT", "HUP", "KILL"]
+        .iter()
+        .cycle()
+        .take(16)
+        .enumerate()
+    {
+        let mut child = pilotage(here, &learn)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(60 + 17 * round as u64));
+        assert!(system(
+            here,
+            &["kill", "-s", signal, &child.id().to_string()]
+        ));
+        assert!(!child.wait().unwrap().success());
+        let left = listing(here);
+        assert!(left.iter().all(|name| name == "run.json"), "{left:?}");
+    }
+    assert_eq!(listing(here), ["run.json"]);
+}
+
+fn built_in(name: &str) -> String {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    fs::read_to_string(models.join(format!("{name}.toml"))).unwrap()
+}
+
+/// A command that must end with one message that holds certain words, and in time.
+fn refused(folder: &Path, arguments: &[&str], says: &str) {
+    let clock = Instant::now();
+    let output = pilotage(folder, arguments).output().unwrap();
+    let said = text(&output.stderr);
+    let code = output.status.code();
+    assert!(
+        matches!(code, Some(1 | 2)),
+        "{arguments:?}: {code:?}, {said}"
+    );
+    assert_eq!(said.matches("error:").count(), 1, "{arguments:?}: {said}");
+    assert!(said.contains(says), "{arguments:?}: {said}");
+    assert!(output.stdout.is_empty(), "{arguments:?} prints a result");
+    assert!(clock.elapsed() < Duration::from_secs(20), "{arguments:?}");
+}
+
+const MAX: &str = "18446744073709551615";
+
+#[test]
+fn extreme_settings_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: &[(&[&str], &str)] = &[
+        (&["--threads", "100000"], "at most 1024"),
+        (&["--threads", MAX], "at most 1024"),
+        (&["--effort", "nan"], "above 0, at most 1000"),
+        (&["--effort", "0"], "above 0, at most 1000"),
+        (&["--effort", "inf"], "above 0, at most 1000"),
+        (&["--effort", "1e300"], "above 0, at most 1000"),
+        (&["--grid", "0"], "points = 0 is out of range"),
+        (&["--grid", "1"], "points = 1 is out of range"),
+        (
+            &["--with", "qmdp", "--grid", "0"],
+            "points = 0 is out of range",
+        ),
+    ];
+    for (settings, says) in rows {
+        refused(
+            folder.path(),
+            &[&["solve", "corridor"], *settings].concat(),
+            says,
+        );
+    }
+}
+
+#[test]
+fn streams_that_are_full_or_closed_end_in_an_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    for (line, fits) in [
+        ("pilotage check corridor > /dev/full", false),
+        ("pilotage check --schema > /dev/full", false),
+        ("pilotage list > /dev/full", false),
+        ("pilotage list --json > /dev/full", false),
+        ("pilotage --help > /dev/full", false),
+        ("pilotage --version > /dev/full", false),
+        ("pilotage solve tiger --episodes 10 > /dev/full", false),
+        ("pilotage check nowhere 2> /dev/full", false),
+        ("pilotage check nowhere 2>&-", false),
+        ("pilotage check nowhere 2> >(true)", false),
+        ("pilotage solve corridor --seed x 2> /dev/full", false),
+        ("pilotage check nowhere > /dev/full 2>&1", false),
+        ("pilotage check corridor 2> /dev/full", true),
+        ("pilotage check corridor 2>&-", true),
+        ("pilotage check corridor <&- 2>&-", true),
+    ] {
+        let output = shell(folder.path(), &format!("{line}\nexit $?"));
+        let code = output.status.code();
+        assert!(
+            if fits {
+                code == Some(0)
+            } else {
+                matches!(code, Some(1 | 2))
+            },
+            "{line}: {code:?}"
+        );
+        assert!(!text(&output.stderr).contains("panicked"), "{line}");
+    }
+}
+
+#[test]
+fn a_path_that_is_not_utf8_is_a_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, policy) = (
+        OsStr::from_bytes(b"hall\xff.toml"),
+        OsStr::from_bytes(b"p\xfe.json"),
+    );
+    fs::write(folder.path().join(model), built_in("corridor")).unwrap();
+    let (out, problem) = (OsStr::new("--out"), OsStr::new("--problem"));
+    let word = OsStr::new;
+    let episodes = [word("--episodes"), word("10")];
+    for arguments in [
+        vec![word("check"), model],
+        vec![word("solve"), model, out, policy, episodes[0], episodes[1]],
+        vec![
+            word("simulate"),
+            model,
+            word("--policy"),
+            policy,
+            word("--world"),
+            model,
+            episodes[0],
+            episodes[1],
+        ],
+        vec![word("draw"), policy, problem, model],
+    ] {
+        let output = pilotage(folder.path(), &[])
+            .args(&arguments)
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{arguments:?}: {}",
+            text(&output.stderr)
+        );
+    }
+    let pictures = fs::read_dir(folder.path()).unwrap();
+    let names: Vec<_> = pictures.map(|entry| entry.unwrap().file_name()).collect();
+    assert!(
+        names.contains(&OsStr::from_bytes(b"p\xfe-map.svg").to_owned()),
+        "{names:?}"
+    );
+}
+
+/// A policy names its problem; that is no reason to read whatever file it names.
+#[test]
+fn a_policy_does_not_choose_the_files_that_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(solve_to(folder.path(), "p.json").status.success());
+    let policy = fs::read_to_string(folder.path().join("p.json")).unwrap();
+    fs::write(folder.path().join("secret"), "password = 'abc'").unwrap();
+    let named = policy.replacen("\"tiger\"", "\"secret\"", 1);
+    fs::write(folder.path().join("p.json"), named).unwrap();
+    let output = pilotage(folder.path(), &["draw", "p.json"])
+        .output()
+        .unwrap();
+    assert!(!output.status.success());
+    assert!(!text(&output.stderr).contains("password"));
+}
+
+/// However many episodes are asked for, few are kept.
+#[test]
+fn a_million_million_episodes_take_no_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(solve_to(folder.path(), "p.json").status.success());
+    for line in [
+        "simulate tiger --policy p.json --episodes 1000000000000",
+        &format!("simulate tiger --policy p.json --episodes {MAX}"),
+        "solve tiger --value-lost --episodes 1000000000000",
+        "solve scalar-lqg --with lqg --episodes 1000000000000",
+    ] {
+        let limited = format!(
+            "ulimit -v 2000000; timeout 1.5 '{}' {line}",
+            env!("CARGO_BIN_EXE_pilotage")
+        );
+        let output = shell(folder.path(), &limited);
+        // Still at it when it was told to stop.
+        assert_eq!(
+            output.status.code(),
+            Some(124),
+            "{line}: {}",
+            text(&output.stderr)
+        );
+    }
+}
