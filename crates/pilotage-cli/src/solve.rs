@@ -5,12 +5,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use pilotage::model::WallBelief;
 use pilotage::policy::{check_writable, write_whole};
-use pilotage::scenario::{self, Scenario, Walls};
-use pilotage::simulate::{Estimate, Evaluation as Earned};
-use pilotage::solve::policy_search::MOST_EFFORT;
-use pilotage::solve::{Entry, Form, Registry, Request, Solution, Solver, solve};
+use pilotage::scenario::{self, Scenario};
+use pilotage::simulate::Estimate;
+use pilotage::solve::{Earned, Entry, Form, Registry, Request, Solution, Solver, solve};
 use pilotage_report::{returns_svg, values_svg};
 use serde_json::json;
 
@@ -48,6 +46,13 @@ pub struct Arguments {
     learner: Learner,
 }
 
+fn key_and_value(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text
+        .split_once('=')
+        .ok_or_else(|| format!("`{text}` is not KEY=VALUE, such as lambda=0.5"))?;
+    Ok((key.trim().to_owned(), value.trim().to_owned()))
+}
+
 /// What the files of the curves end in.
 const CURVES: [&str; 2] = ["returns.svg", "values.svg"];
 
@@ -60,21 +65,6 @@ struct Learner {
     /// Draw how learning went: FILE-returns.svg and FILE-values.svg.
     #[arg(long, value_name = "FILE")]
     curves: Option<PathBuf>,
-}
-
-fn factor(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(factor) if factor > 0.0 && factor <= MOST_EFFORT => Ok(factor),
-        Ok(_) => Err(format!("must be above 0, at most {MOST_EFFORT}")),
-        Err(error) => Err(format!("{error}")),
-    }
-}
-
-fn key_and_value(text: &str) -> Result<(String, String), String> {
-    let (key, value) = text
-        .split_once('=')
-        .ok_or_else(|| format!("`{text}` is not KEY=VALUE, such as lambda=0.5"))?;
-    Ok((key.trim().to_owned(), value.trim().to_owned()))
 }
 
 impl Learner {
@@ -129,7 +119,7 @@ struct Told {
     #[arg(long, value_name = "STEPS", value_parser = at_least_one)]
     group: Option<usize>,
     /// Factor on the length of a policy search's simulations: less is faster, more is thorougher.
-    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    #[arg(long, value_name = "FACTOR")]
     effort: Option<f64>,
     /// kbvi looks less far ahead with every step of an episode.
     #[arg(long)]
@@ -298,7 +288,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             entry.name()
         )));
     }
-    arguments.check_files()?;
     let (solver, runs) = arguments.told.solver(&registry, entry)?;
     let solver = &solver;
     if arguments.out.is_some() && !solver.makes_automaton(&scenario.model) {
@@ -314,6 +303,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         runs,
         checkpoint: arguments.learner.checkpoint.clone(),
     };
+    arguments.check_files()?;
     arguments.evaluation.start_threads()?;
     let bars = Bars::new(arguments.json);
 
@@ -325,7 +315,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let curves = arguments.learner.draw(&solution)?;
     let clock = Instant::now();
-    let earned = solution.evaluate(&scenario, arguments.evaluation.options(), &bars)?;
+    let earned = solution.earned(&scenario, arguments.evaluation.options(), &bars)?;
     earned.check()?;
     let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
     let lost = arguments
@@ -400,7 +390,10 @@ fn report(
         "nodes": solution.automaton().map(|automaton| automaton.nodes.len()),
         "planned_value": solution.planned_value,
         "samples": solution.samples,
-        "evaluation": earned,
+        "evaluation_assumed": earned.assumed,
+        "evaluation": earned.world,
+        "upper_bound": serde_json::Value::Null,
+        "remarks": earned.remarks,
         "seconds": { "solve": solve, "evaluate": evaluate },
     })
 }
@@ -417,10 +410,17 @@ fn shown(
     let mut lines = vec![summary::heading(&scenario.model.name, solver.name(), nodes)];
     lines.extend(solution.automaton().map(summary::nodes));
     lines.push(String::new());
-    lines.push(summary::evaluation(earned, solution.planned_value));
-    if scenario.truth.walls == Walls::Clamp && scenario.model.belief.walls == WallBelief::Ignore {
-        lines.push("  the filter does not know of the walls, so the plan expects another return than is earned".to_owned());
-    }
+    lines.push(summary::earned(
+        earned,
+        solution.planned_value,
+        scenario.is_as_assumed(),
+    ));
+    lines.extend(
+        earned
+            .remarks
+            .iter()
+            .map(|remark| format!("  remark: {remark}")),
+    );
     if let Some(horizon) = solution.policy_convergence_horizon {
         lines.push(format!("  policy convergence horizon {horizon}"));
     }

@@ -6,6 +6,7 @@ use comfy_table::presets;
 use comfy_table::{CellAlignment, Table};
 use pilotage::policy::{Automaton, Place};
 use pilotage::simulate::{Estimate, Evaluation};
+use pilotage::solve::Earned;
 
 /// Rows of a node table that are shown before it is cut.
 const ROWS: usize = 24;
@@ -24,14 +25,44 @@ pub fn estimate(estimate: &Estimate) -> String {
     format!("{:.4} ± {:.4}", estimate.mean, estimate.stderr)
 }
 
+/// What a saved policy earns, with what was planned when it was made.
 pub fn evaluation(evaluation: &Evaluation, planned: Option<f64>) -> String {
-    let mut text = String::new();
-    let planned = planned.map_or(String::new(), |value| format!("   (planned {value:.4})"));
+    let mut text = planned_line(planned);
     let _ = writeln!(
         text,
-        "  discounted return    {}{planned}",
+        "  discounted return    {}",
         estimate(&evaluation.discounted)
     );
+    text + &rest(evaluation)
+}
+
+/// What a solution earns: as planned, where its model holds, and in the world; one line where the last two are the same thing.
+pub fn earned(earned: &Earned, planned: Option<f64>, as_assumed: bool) -> String {
+    if as_assumed {
+        return evaluation(&earned.world, planned);
+    }
+    let mut text = planned_line(planned);
+    let _ = writeln!(
+        text,
+        "  discounted return    {} where the model holds",
+        estimate(&earned.assumed.discounted)
+    );
+    let _ = writeln!(
+        text,
+        "                       {} in the world",
+        estimate(&earned.world.discounted)
+    );
+    text + &rest(&earned.world)
+}
+
+fn planned_line(planned: Option<f64>) -> String {
+    planned.map_or(String::new(), |value| {
+        format!("  planned              {value:.4}\n")
+    })
+}
+
+fn rest(evaluation: &Evaluation) -> String {
+    let mut text = String::new();
     let _ = writeln!(
         text,
         "  undiscounted return  {}",

@@ -19,6 +19,17 @@ pub struct Earned {
     pub remarks: Vec<String>,
 }
 
+impl Earned {
+    /// Whether there was a belief to act on all the time.
+    ///
+    /// # Errors
+    /// As [`Evaluation::check`].
+    pub fn check(&self) -> Result<()> {
+        self.assumed.check()?;
+        self.world.check()
+    }
+}
+
 /// A promise that misses what is earned by more than three standard errors and this share of it is remarked upon.
 const SHARE: f64 = 0.01;
 
@@ -39,6 +50,9 @@ impl Solution {
             false => self.evaluate(&Scenario::assumed(&scenario.model), options, observer)?,
         };
         let mut remarks = self.remarks.clone();
+        if !self.converged && self.planned_value.is_some() {
+            remarks.push("not converged: the policy still changes with more work".to_owned());
+        }
         let missed = self
             .planned_value
             .and_then(|planned| missed(planned, &assumed, &scenario.model));

@@ -17,11 +17,11 @@ use crate::error::Result;
 use crate::model::Model;
 use crate::observe::Observer;
 
+/// Most [`PolicySearch::effort`].
+const MOST_EFFORT: f64 = 1000.0;
+
 /// Name of the solver in errors and policies.
 const SOLVER: &str = "policy-search";
-
-/// Most [`PolicySearch::effort`].
-pub const MOST_EFFORT: f64 = 1000.0;
 
 /// The planner that searches switching planes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -45,10 +45,15 @@ impl Default for PolicySearch {
 impl Settings for PolicySearch {
     fn validate(&self) -> Result<()> {
         let (weight, effort) = (self.control_weight, self.effort);
-        let fits = weight > 0.0 && weight.is_finite();
-        ensure("control_weight", weight, fits, "above 0")?;
-        let fits = effort > 0.0 && effort <= MOST_EFFORT;
-        ensure("effort", effort, fits, "above 0, at most 1000")
+        let within = |value: f64, most: f64| value > 0.0 && value <= most;
+        ensure(
+            "control_weight",
+            weight,
+            within(weight, f64::MAX),
+            "above 0",
+        )?;
+        let range = "above 0, at most 1000";
+        ensure("effort", effort, within(effort, MOST_EFFORT), range)
     }
 }
 
