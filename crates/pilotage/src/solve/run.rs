@@ -1,5 +1,6 @@
 //! One way to run any solver: what it finds is brought into the form asked for here, and nowhere else.
 
+use super::settings::ensure;
 use super::solver::{Found, Learner, Plan, Planner, Problem, Request, Solver};
 use super::{Form, Solution, Solved, compile};
 use crate::error::Result;
@@ -36,6 +37,7 @@ pub fn plan(
     request: &Request,
     observer: &dyn Observer,
 ) -> Result<Solution> {
+    ensure("runs", request.runs, request.runs >= 1, "at least 1")?;
     let problem = Problem::new(model, request);
     problem.mdp().levels().check(model)?;
     planner.accepts(model)?;
@@ -49,6 +51,10 @@ pub fn plan(
         policy_convergence_horizon,
         remarks,
     } = planner.plan(&problem, observer)?;
+    let levels = match &policy {
+        Found::Rule { mdp, .. } => mdp.levels().len(),
+        Found::Automaton(_) | Found::Control(_) => problem.mdp().levels().len(),
+    };
     let policy = match (policy, request.form) {
         (Found::Control(controller), _) => Solved::Control(controller),
         (Found::Rule { policy, mdp }, Form::Grid) => Solved::Rule {
@@ -75,7 +81,7 @@ pub fn plan(
         policy,
         planned_value: value,
         policy_convergence_horizon,
-        levels: problem.mdp().levels().len(),
+        levels,
         samples: None,
         learning: None,
         converged,
@@ -95,6 +101,7 @@ pub fn learn(
     observer: &dyn Observer,
 ) -> Result<Solution> {
     let model = &scenario.model;
+    ensure("runs", request.runs, request.runs >= 1, "at least 1")?;
     let problem = Problem::new(model, request);
     problem.mdp().levels().check(model)?;
     learner.accepts(model)?;
