@@ -22,6 +22,7 @@ use super::ceiling::Ceiling;
 use super::frame::{AxisModel, Frame, inside};
 use super::law::{Law, crowding, kernel};
 use super::levels::{Levels, Variances};
+use super::measure::common_measure;
 use super::step::{self, after, before, restarts};
 use crate::model::{ActionId, ModeId, Then};
 use crate::observe::Observer;
@@ -294,7 +295,7 @@ impl<'a> Planner<'a> {
             levels,
             fine: true,
         };
-        let mut count = points.unwrap_or(if frame.is_real(1) { 601 } else { 4001 });
+        let mut count = points.unwrap_or(if frame.is_real(1) { 601 } else { 2001 });
         loop {
             planner.lattice = [planner.axis(0, count), planner.axis(1, count)];
             if points.is_some() || count <= 61 || planner.work(length) < WORK {
@@ -893,19 +894,6 @@ fn reach(levels: &Levels, restarts: bool) -> (Vec<Vec<usize>>, Vec<usize>) {
         }
         reached.push(next);
     }
-}
-
-/// The largest number of which all displacements are multiples, within a millionth.
-fn common_measure(displacement: &[f64]) -> Option<f64> {
-    let measure = displacement.iter().fold(0.0, |measure: f64, d| {
-        let (mut x, mut y) = (measure.max(d.abs()), measure.min(d.abs()));
-        let small = 1e-6 * x;
-        while y > small {
-            (x, y) = (y, (x % y).min(y - x % y));
-        }
-        x
-    });
-    (measure > 0.0).then_some(measure)
 }
 
 /// `(row, column)` taken along its targets, by linear interpolation.

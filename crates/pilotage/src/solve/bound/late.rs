@@ -1,0 +1,640 @@
+//! The bound where the filter is not exact: an agent that is told the state and the mode one step late.
+//!
+//! When it acts, such an agent knows where it was one step before, what it did there and what it has sensed since. It knows at least
+//! as much as any that only acts and senses, so that what it earns at most is a bound; and what it does not know yet, the noise of
+//! one move seen through one reading, is often most of what there is to know. For a state `s` in mode `q`,
+//!
+//! ```text
+//! Q_k(s, q, a) = r(s, q, a) + E r'(s') + discount * E_o max_a' E[ Q_(k-1)(s', q', a') | s, a, o ]
+//!             = r(s, q, a) + E [ r'(s') + discount * V_(k-1)(s', q') ] - discount * price(s, a)
+//! price       = E_o min_a' E[ V(s', q') - Q(s', q', a') | s, a, o ],   V = max_a Q
+//! ```
+//!
+//! with `s'` where the move ended: the value of an agent that sees everything, less the price of not seeing it yet (the fast informed
+//! bound of Hauskrecht 2000, for continuous states). A first action is taken for all starts at once.
+//!
+//! It is rounded up at every step:
+//!
+//! - All rewards and events are constant in the cells of a partition, and `Q` is kept linear in each, with a value of its own at
+//!   either end. Expectations over the noise of the move are exact.
+//! - In a cell of width `h` the expectation lies at most `0.484 range (A h)^2 / (8 q)` above its chord, `q` the variance of the motion
+//!   and `range` that of what is expected. Without noise cells move onto cells.
+//! - The price is never too high: the integral over the reading is a sum over points a step apart, less the most by which a sum can
+//!   exceed the integral of a function of its curvature, `step^2 E max_a'(V - Q) / (12 R)` about.
+//! - An agent that sees everything at all steps but the first few is only ever better off, which saves time in two dimensions.
+
+use super::ceiling::Ceiling;
+use super::cells::Cells;
+use super::frame::{Frame, Noise};
+use super::law::Law;
+use super::step::{After, Before, after, before};
+use crate::belief::gaussian::normal_density;
+use crate::model::{ActionId, ModeId, Then};
+use crate::observe::Observer;
+use crate::parallel;
+
+/// Most sweeps; an episode that is longer begins them with the ceiling.
+const MOST_SWEEPS: usize = 20_000;
+/// Multiplications that all sweeps together may take.
+const WORK: f64 = 2e10;
+/// The second derivative of a Gaussian density of variance 1 has this integral where it is positive.
+const CURVATURE: f64 = 0.483_941_45;
+
+/// One place along an axis from which the noise carries on, and what can be sensed of where it ends.
+#[derive(Debug)]
+struct Place {
+    /// Weights of the ends of all cells in an expectation.
+    flat: Vec<f64>,
+    /// The same, weighted by the density of a reading: a share of `flat` for each reading. From which end on, and the weights.
+    readings: Vec<(usize, Vec<f64>)>,
+}
+
+/// Where the actions of a class lead along an axis.
+#[derive(Debug)]
+struct Moves {
+    places: Vec<Place>,
+    /// By action of the model and end of a cell; open cells and actions of other classes have none.
+    from: Vec<Vec<usize>>,
+    /// What the sum over readings may exceed the integral by, for what is at stake.
+    loss: f64,
+    /// What a chord may lie below the function, by cell, for its range.
+    gap: Vec<f64>,
+}
+
+/// What a move can lead to: the same for many modes and actions.
+#[derive(Debug)]
+struct Group {
+    class: usize,
+    /// By cell.
+    afters: Vec<After>,
+}
+
+/// What an action does in a cell before the move.
+#[derive(Debug, Clone, Copy)]
+struct Begin {
+    before: Before,
+    /// Where it goes on to move.
+    group: usize,
+}
+
+struct Planner<'a> {
+    frame: &'a Frame<'a>,
+    cells: [Cells; 2],
+    /// By class and axis.
+    moves: Vec<[Moves; 2]>,
+    groups: Vec<Group>,
+    /// By mode, action and cell.
+    begins: Vec<Vec<Vec<Begin>>>,
+    ceiling: Ceiling,
+    /// `Q`, by mode and action, at the ends of cells.
+    q: Vec<Vec<Vec<f64>>>,
+    start_value: f64,
+}
+
+/// The bound, or why the model is too much for it.
+pub(super) fn bound(
+    frame: &Frame,
+    points: Option<usize>,
+    observer: &dyn Observer,
+) -> Result<f64, String> {
+    if frame.walled && frame.model.map.is_some() {
+        return Err("the walls of its map stop moves along both variables together".to_owned());
+    }
+    let mut planner = Planner::new(frame, points)?;
+    Ok(planner.solve(observer))
+}
+
+impl<'a> Planner<'a> {
+    fn new(frame: &'a Frame<'a>, points: Option<usize>) -> Result<Self, String> {
+        let count = points.unwrap_or(if frame.is_real(1) { 32 } else { 160 }).max(2);
+        let cells = [Cells::new(frame, 0, count)?, Cells::new(frame, 1, count)?];
+        let moves: Result<Vec<[Moves; 2]>, String> = (0..frame.classes.len())
+            .map(|class| Ok([moves(frame, &cells[0], class, 0)?, moves(frame, &cells[1], class, 1)?]))
+            .collect();
+        let model = frame.model;
+        let (modes, actions) = (model.modes.len(), model.actions.len());
+        let size = cells[0].places() * cells[1].places();
+        let mut planner = Self {
+            frame,
+            moves: moves?,
+            groups: Vec::new(),
+            begins: Vec::new(),
+            ceiling: Ceiling::new(model),
+            q: vec![vec![vec![0.0; size]; actions]; modes],
+            start_value: 0.0,
+            cells,
+        };
+        planner.begins = (0..modes)
+            .map(|mode| (0..actions).map(|action| planner.begin(mode, action)).collect())
+            .collect();
+        Ok(planner)
+    }
+
+    fn begin(&mut self, mode: ModeId, action: ActionId) -> Vec<Begin> {
+        let frame = self.frame;
+        let all: Vec<[f64; 2]> = (0..self.cells[0].count())
+            .flat_map(|x| (0..self.cells[1].count()).map(move |y| (x, y)))
+            .map(|(x, y)| [self.cells[0].inside(x), self.cells[1].inside(y)])
+            .collect();
+        let mut known: Vec<(Before, usize)> = Vec::new();
+        let mut begins = Vec::with_capacity(all.len());
+        for at in &all {
+            let before = before(frame.model, mode, action, frame.state(at));
+            let alike = |other: &Before| {
+                (other.mode, other.happened) == (before.mode, before.happened)
+            };
+            let found = known.iter().find(|(other, _)| alike(other));
+            let group = match (before.then, found) {
+                (Then::Continue, Some(found)) => found.1,
+                (Then::Continue, None) => {
+                    let to = |at: &[f64; 2]| after(frame.model, mode, action, &before, frame.state(at));
+                    let group = self.group(frame.class_of[action], all.iter().map(to).collect());
+                    known.push((before, group));
+                    group
+                }
+                _ => 0,
+            };
+            begins.push(Begin { before, group });
+        }
+        begins
+    }
+
+    fn group(&mut self, class: usize, afters: Vec<After>) -> usize {
+        let same = |group: &Group| group.class == class && group.afters == afters;
+        self.groups.iter().position(same).unwrap_or_else(|| {
+            self.groups.push(Group { class, afters });
+            self.groups.len() - 1
+        })
+    }
+
+    fn sizes(&self) -> [usize; 2] {
+        [self.cells[0].places(), self.cells[1].places()]
+    }
+
+    /// The cell of an end of a cell.
+    fn cell_of(&self, place: usize) -> usize {
+        let columns = self.cells[1].places();
+        place / columns / 2 * self.cells[1].count() + place % columns / 2
+    }
+
+    /// Multiplications of a sweep in which readings are weighed.
+    fn work(&self) -> f64 {
+        let actions = self.frame.class_of.len() as f64;
+        let of_group = |group: &Group| {
+            let [x, y] = &self.moves[group.class];
+            let readings = |moves: &Moves| -> f64 {
+                let of = moves.places.iter();
+                of.map(|place| place.readings.len() as f64).sum()
+            };
+            let weights = |moves: &Moves| -> f64 {
+                let of = moves.places.iter().flat_map(|place| &place.readings);
+                of.map(|(_, weights)| weights.len() as f64).sum()
+            };
+            actions * (weights(x) * self.cells[1].places() as f64 + readings(x) * weights(y))
+        };
+        self.groups.iter().map(of_group).sum()
+    }
+
+    /// Backwards from the end of the episode.
+    fn solve(&mut self, observer: &dyn Observer) -> f64 {
+        let length = self.frame.model.episode.length;
+        let sweeps = length.min(MOST_SWEEPS);
+        let mut ceiling = self.ceiling.within(length - sweeps);
+        self.q.iter_mut().flatten().flatten().for_each(|q| *q = ceiling);
+        self.start_value = ceiling;
+        let late = sweeps.min((WORK / self.work()).max(1.0) as usize);
+        for (count, told_late) in [(sweeps - late, false), (late, true)] {
+            for sweep in 0..count {
+                ceiling = self.ceiling.one_more(ceiling);
+                let further = self.sweep(told_late, ceiling);
+                observer.progress("bound", sweep as u64 + 1, count as u64);
+                if let Some(further) = further {
+                    self.q.iter_mut().flatten().flatten().for_each(|q| *q += further);
+                    self.start_value += further;
+                    ceiling = f64::INFINITY;
+                    break;
+                }
+            }
+        }
+        self.start_value
+    }
+
+    /// One step more. Once a step more changes next to nothing, the most that all further ones can add.
+    fn sweep(&mut self, told_late: bool, ceiling: f64) -> Option<f64> {
+        let model = self.frame.model;
+        let (modes, actions) = (model.modes.len(), model.actions.len());
+        let values: Vec<Vec<f64>> = self.q.iter().map(|q| most(q)).collect();
+        let expected: Vec<Expected> = (0..self.groups.len())
+            .map(|group| self.expect(group, &values, told_late))
+            .collect();
+        let mut rise = f64::NEG_INFINITY;
+        let mut change = 0.0_f64;
+        let mut scale = 0.0_f64;
+        let mut q = Vec::with_capacity(modes);
+        for mode in 0..modes {
+            let mut of_mode = Vec::with_capacity(actions);
+            for action in 0..actions {
+                let fresh = self.back_up(mode, action, &expected, ceiling);
+                for (new, old) in fresh.iter().zip(&self.q[mode][action]) {
+                    rise = rise.max(new - old);
+                    change = change.max((new - old).abs());
+                    scale = scale.max(new.abs());
+                }
+                of_mode.push(fresh);
+            }
+            q.push(of_mode);
+        }
+        self.q = q;
+        let start = self.at_start();
+        rise = rise.max(start - self.start_value);
+        change = change.max((start - self.start_value).abs());
+        self.start_value = start;
+        let further = |step: f64| step / (1.0 - model.discount);
+        (model.discount < 1.0 && further(change) <= 1e-5 * scale).then(|| further(rise.max(0.0)))
+    }
+
+    fn expect(&self, group: usize, values: &[Vec<f64>], told_late: bool) -> Expected {
+        let Group { class, afters } = &self.groups[group];
+        let (model, actions) = (self.frame.model, self.frame.class_of.len());
+        let [rows, columns] = self.sizes();
+        let size = rows * columns;
+        // By column and then row, for the sums along the first axis.
+        let turned = |place: usize| place % columns * rows + place / columns;
+        let mut worth = vec![0.0; size];
+        let mut stakes = vec![0.0; size];
+        let mut gaps = vec![vec![0.0; size]; if told_late { actions } else { 0 }];
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for place in 0..size {
+            let after = &afters[self.cell_of(place)];
+            let to = turned(place);
+            worth[to] = after.reward
+                + match after.then {
+                    Then::End => 0.0,
+                    Then::Restart => model.discount * self.start_value,
+                    Then::Continue => model.discount * values[after.mode][place],
+                };
+            high = high.max(worth[to]);
+            low = low.min(worth[to]);
+            if after.then != Then::Continue {
+                continue;
+            }
+            for (action, gaps) in gaps.iter_mut().enumerate() {
+                let gap = values[after.mode][place] - self.q[after.mode][action][place];
+                gaps[to] = gap;
+                stakes[to] = f64::max(stakes[to], gap);
+                low = low.min(worth[to] - model.discount * gap);
+            }
+        }
+        let [x, y] = &self.moves[*class];
+        let loss = x.loss + y.loss;
+        let rows_of = parallel::map(x.places.len(), |row| {
+            let from = &x.places[row];
+            let worths = along(&worth, rows, &from.flat);
+            let stakes = along(&stakes, rows, &from.flat);
+            let sensed: Vec<Vec<f64>> = gaps.iter().map(|gap| sense(gap, rows, from)).collect();
+            let at = |place: &Place| {
+                let expected = dot(&place.flat, &worths);
+                let price = price(&sensed, from.readings.len(), place)
+                    - loss * dot(&place.flat, &stakes);
+                expected - model.discount * price.max(0.0)
+            };
+            y.places.iter().map(at).collect::<Vec<f64>>()
+        });
+        Expected {
+            values: rows_of,
+            range: high - low,
+            outwards: self.outwards(&worth),
+        }
+    }
+
+    /// By axis and side, what is worth most across that axis and from each place outwards.
+    fn outwards(&self, turned: &[f64]) -> [[Vec<f64>; 2]; 2] {
+        let [rows, _] = self.sizes();
+        std::array::from_fn(|i| {
+            let mut most = vec![f64::NEG_INFINITY; self.sizes()[i]];
+            for (index, value) in turned.iter().enumerate() {
+                let place = [index % rows, index / rows][i];
+                most[place] = most[place].max(*value);
+            }
+            let mut down = most.clone();
+            for k in 1..most.len() {
+                down[k] = down[k].max(down[k - 1]);
+            }
+            for k in (1..most.len()).rev() {
+                most[k - 1] = most[k - 1].max(most[k]);
+            }
+            [down, most]
+        })
+    }
+
+    fn back_up(
+        &self,
+        mode: ModeId,
+        action: ActionId,
+        expected: &[Expected],
+        ceiling: f64,
+    ) -> Vec<f64> {
+        let model = self.frame.model;
+        let [rows, columns] = self.sizes();
+        let class = self.frame.class_of[action];
+        let [x, y] = &self.moves[class];
+        let mut fresh = vec![0.0; rows * columns];
+        for (place, value) in fresh.iter_mut().enumerate() {
+            let begin = &self.begins[mode][action][self.cell_of(place)];
+            let (row, column) = (place / columns, place % columns);
+            let open = self.cells[0].open_side(row / 2).is_some()
+                || self.cells[1].open_side(column / 2).is_some();
+            let future = match begin.before.then {
+                Then::End => 0.0,
+                Then::Restart => model.discount * self.start_value,
+                Then::Continue if open => f64::NEG_INFINITY,
+                Then::Continue => {
+                    let to = &expected[begin.group];
+                    let margin = x.gap[row / 2] + y.gap[column / 2];
+                    to.values[x.from[action][row]][y.from[action][column]] + margin * to.range
+                }
+            };
+            *value = (begin.before.reward + future).min(ceiling);
+        }
+        for i in 0..2 {
+            for side in 0..2 {
+                self.raise_open(&mut fresh, (i, side), mode, action, expected);
+            }
+        }
+        fresh
+    }
+
+    /// An open cell is worth at most what is paid in it at most and then the most of everything from there outwards.
+    fn raise_open(
+        &self,
+        values: &mut [f64],
+        (i, side): (usize, usize),
+        mode: ModeId,
+        action: ActionId,
+        expected: &[Expected],
+    ) {
+        let cell = side * (self.cells[i].count() - 1);
+        if self.cells[i].open_side(cell) != Some(side) {
+            return;
+        }
+        let of = &self.frame.axes[i];
+        let edge = of.a * self.cells[i].outer_end(side) + of.displacement[action];
+        let law = Law::normal(edge, self.frame.noise(action, i).motion.sqrt());
+        let weights = self.cells[i].weights(&law, true);
+        let beyond = |group: usize| {
+            let outwards = &expected[group].outwards[i][side];
+            match of.a >= 0.0 {
+                true => dot(&weights, outwards),
+                false => outwards.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            }
+        };
+        let counts = [self.cells[0].count(), self.cells[1].count()];
+        let worth = (0..counts[1 - i]).map(|across| {
+            let index = match i {
+                0 => cell * counts[1] + across,
+                _ => across * counts[1] + cell,
+            };
+            let Begin { before, group } = self.begins[mode][action][index];
+            before.reward
+                + match before.then {
+                    Then::End => 0.0,
+                    Then::Restart => self.frame.model.discount * self.start_value,
+                    Then::Continue => beyond(group),
+                }
+        });
+        let worth = worth.fold(f64::NEG_INFINITY, f64::max);
+        let columns = self.cells[1].places();
+        for (place, value) in values.iter_mut().enumerate() {
+            if [place / columns, place % columns][i] / 2 == cell {
+                *value = value.max(worth);
+            }
+        }
+    }
+
+    /// One action for all starts.
+    fn at_start(&self) -> f64 {
+        let weights: Vec<[Vec<f64>; 2]> = self
+            .frame
+            .starts
+            .iter()
+            .map(|start| std::array::from_fn(|i| self.cells[i].weights(&start.laws[i], true)))
+            .collect();
+        let columns = self.cells[1].places();
+        let worth = |action: ActionId| -> f64 {
+            let starts = self.frame.starts.iter().zip(&weights);
+            starts
+                .map(|(start, [x, y])| {
+                    let rows = self.q[start.mode][action].chunks_exact(columns).zip(x);
+                    let value: f64 = rows.map(|(row, weight)| weight * dot(row, y)).sum();
+                    start.weight * value
+                })
+                .sum()
+        };
+        (0..self.frame.class_of.len())
+            .map(worth)
+            .fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// What a move of a group brings.
+struct Expected {
+    /// By place along the first axis and along the second.
+    values: Vec<Vec<f64>>,
+    /// Between the least and the most that can come of it.
+    range: f64,
+    /// By axis and side, see [`Planner::outwards`].
+    outwards: [[Vec<f64>; 2]; 2],
+}
+
+/// The moves of a class along an axis.
+fn moves(frame: &Frame, cells: &Cells, class: usize, axis: usize) -> Result<Moves, String> {
+    let noise = frame.classes[class][axis];
+    let of = &frame.axes[axis];
+    let narrow = cells.span(usize::from(cells.open_side(0).is_some()));
+    let resolution = narrow.1 - narrow.0;
+    let mut keys: Vec<f64> = Vec::new();
+    let mut from = Vec::new();
+    for action in 0..frame.class_of.len() {
+        let mut places = vec![usize::MAX; cells.places()];
+        if frame.class_of[action] == class {
+            for (end, place) in places.iter_mut().enumerate() {
+                let (cell, side) = (end / 2, end % 2);
+                if cells.open_side(cell).is_some() {
+                    continue;
+                }
+                let key = match noise.motion > 0.0 {
+                    true => {
+                        let (low, high) = cells.span(cell);
+                        of.a * [low, high][side] + of.displacement[action]
+                    }
+                    false => cells.shifted(cell, side, of.displacement[action])? as f64,
+                };
+                let near = |known: &f64| (known - key).abs() <= 1e-7 * resolution.min(1.0);
+                *place = keys.iter().position(near).unwrap_or_else(|| {
+                    keys.push(key);
+                    keys.len() - 1
+                });
+            }
+        }
+        from.push(places);
+    }
+    let step = match frame.is_real(1) {
+        true => 0.5,
+        false => 1.0 / 6.0,
+    };
+    let places = parallel::map(keys.len(), |key| {
+        place(cells, noise, keys[key], resolution, step)
+    });
+    let weighs_readings = noise.motion > 0.0
+        && noise.precision > 0.0
+        && 1.0 / noise.precision > resolution * resolution;
+    let gap = |cell: usize| match cells.open_side(cell) {
+        None if noise.motion > 0.0 => {
+            let (low, high) = cells.span(cell);
+            let width = of.a * (high - low);
+            (CURVATURE * width * width / (8.0 * noise.motion)).min(1.0)
+        }
+        _ => 0.0,
+    };
+    Ok(Moves {
+        places,
+        from,
+        loss: match weighs_readings {
+            // The integral of the curvature of a Gaussian density, and what a sum of its largest values in each step may add.
+            true => step * step / 12.0 * (2.0 * CURVATURE + 1.51 * step),
+            false => 0.0,
+        },
+        gap: (0..cells.count()).map(gap).collect(),
+    })
+}
+
+/// Where the noise carries on to from a place, and what readings say of it, a `step` apart in units of their noise. Those too exact
+/// for the grid are taken for exact.
+fn place(cells: &Cells, noise: Noise, key: f64, resolution: f64, step: f64) -> Place {
+    let unit = |place: usize, weight: f64| (place, vec![weight]);
+    if noise.motion <= 0.0 {
+        let mut flat = vec![0.0; cells.places()];
+        flat[key as usize] = 1.0;
+        return Place {
+            readings: vec![unit(key as usize, 1.0)],
+            flat,
+        };
+    }
+    let law = Law::normal(key, noise.motion.sqrt());
+    let flat = cells.weights(&law, true);
+    if noise.precision <= 0.0 {
+        return Place {
+            readings: vec![(0, flat.clone())],
+            flat,
+        };
+    }
+    let variance = 1.0 / noise.precision;
+    if variance <= resolution * resolution {
+        let seen = flat.iter().enumerate().filter(|(_, weight)| **weight > 1e-12);
+        return Place {
+            readings: seen.map(|(place, &weight)| unit(place, weight)).collect(),
+            flat,
+        };
+    }
+    let sd = variance.sqrt();
+    let [low, high] = cells.stops();
+    let within = |x: f64| {
+        x.max(low.unwrap_or(f64::NEG_INFINITY))
+            .min(high.unwrap_or(f64::INFINITY))
+    };
+    let from = within(key - 5.0 * law.sd) - 5.0 * sd;
+    let to = within(key + 5.0 * law.sd) + 5.0 * sd;
+    let total = (noise.motion + variance).sqrt();
+    let share = noise.motion / (noise.motion + variance);
+    let density = |o: f64, mean: f64, sd: f64| normal_density((o - mean) / sd) / sd;
+    let count = ((to - from) / (step * sd)).ceil() as usize;
+    let reading = |k: usize| {
+        let o = from + k as f64 * step * sd;
+        let held = Law::normal(key + share * (o - key), (share * variance).sqrt());
+        let weigh = density(o, key, total) * step * sd;
+        let mut weights = cells.weights(&held, false);
+        weights.iter_mut().for_each(|weight| *weight *= weigh);
+        let last = weights.len() - 1;
+        for (side, wall) in [low, high].into_iter().enumerate() {
+            if let Some(wall) = wall {
+                let stopped = match side {
+                    0 => law.below(wall),
+                    _ => 1.0 - law.below(wall),
+                };
+                weights[side * last] += stopped * density(o, wall, sd) * step * sd;
+            }
+        }
+        // Left out, a weight only lowers the price.
+        let first = weights.iter().position(|weight| *weight > 1e-9);
+        let end = weights.iter().rposition(|weight| *weight > 1e-9);
+        match (first, end) {
+            (Some(first), Some(end)) => Some((first, weights[first..=end].to_vec())),
+            _ => None,
+        }
+    };
+    Place {
+        readings: (0..=count).filter_map(reading).collect(),
+        flat,
+    }
+}
+
+/// The expectation along the first axis, by place of the second.
+fn along(turned: &[f64], rows: usize, weights: &[f64]) -> Vec<f64> {
+    let columns = turned.chunks_exact(rows);
+    columns.map(|column| dot(column, weights)).collect()
+}
+
+/// The same for every reading: by place of the second axis, then reading.
+fn sense(turned: &[f64], rows: usize, from: &Place) -> Vec<f64> {
+    let columns = turned.chunks_exact(rows);
+    columns
+        .flat_map(|column| {
+            let readings = from.readings.iter();
+            readings.map(|(first, weights)| dot(&column[*first..], weights))
+        })
+        .collect()
+}
+
+/// The sum over readings along both axes of what the best action is expected to miss, not knowing the state.
+fn price(sensed: &[Vec<f64>], readings: usize, place: &Place) -> f64 {
+    let Some(first) = sensed.first() else {
+        return 0.0;
+    };
+    debug_assert_eq!(first.len() % readings.max(1), 0);
+    let mut total = 0.0;
+    let mut least = vec![0.0; readings];
+    let mut sum = vec![0.0; readings];
+    for (from, weights) in &place.readings {
+        for (action, sensed) in sensed.iter().enumerate() {
+            sum.fill(0.0);
+            let lines = sensed[from * readings..].chunks_exact(readings.max(1));
+            for (weight, line) in weights.iter().zip(lines) {
+                sum.iter_mut().zip(line).for_each(|(sum, x)| *sum += weight * x);
+            }
+            match action {
+                0 => least.copy_from_slice(&sum),
+                _ => least
+                    .iter_mut()
+                    .zip(&sum)
+                    .for_each(|(least, sum)| *least = f64::min(*least, *sum)),
+            }
+        }
+        total += least.iter().sum::<f64>();
+    }
+    total
+}
+
+/// The most of all actions.
+fn most(q: &[Vec<f64>]) -> Vec<f64> {
+    let mut most = q[0].clone();
+    for other in &q[1..] {
+        most.iter_mut()
+            .zip(other)
+            .for_each(|(most, q)| *most = most.max(*q));
+    }
+    most
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
