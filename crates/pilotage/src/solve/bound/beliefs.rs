@@ -34,6 +34,15 @@ const MOST_SWEEPS: usize = 20_000;
 /// Multiplications that all sweeps together may take.
 const WORK: f64 = 1.2e10;
 
+/// Fewest points to which an axis is cut down to save work.
+const COARSEST: usize = 61;
+/// Of a variable that there is not.
+const NO_AXIS: Axis = Axis {
+    low: 0.0,
+    step: 1.0,
+    count: 1,
+};
+
 /// What is paid, constant in each cell between the cuts of both axes; the second axis runs faster.
 #[derive(Debug, Clone)]
 struct Paid {
@@ -209,14 +218,21 @@ pub(super) fn bound(
             false => start.laws.map(|law| law.sd * law.sd),
         })
         .collect();
-    let limit = if frame.is_real(1) { 12 } else { 48 };
     let a = [frame.axes[0].a, frame.axes[1].a];
-    let levels = Levels::new(a, &frame.classes, &starts, limit);
-    let mut planner = Planner::new(frame, effects, levels, points);
+    let (most, fewer) = if frame.is_real(1) { (60, 12) } else { (600, 48) };
+    let levels = |limit| Levels::new(a, &frame.classes, &starts, limit, frame.model.episode.length);
+    let mut planner = Planner::new(frame, effects, levels(most));
+    let count = points.unwrap_or(if frame.is_real(1) { 601 } else { 2001 });
+    planner.lay(count);
+    if planner.work() > WORK {
+        planner = Planner::new(frame, planner.effects, levels(fewer));
+        planner.lay(count);
+    }
+    planner.coarsen(count, points);
     let value = planner.solve(observer);
     Ok(Found {
         value,
-        fine: planner.fine,
+        fine: planner.is_fine(),
     })
 }
 
@@ -232,7 +248,6 @@ struct Planner<'a> {
     /// `U`, by mode and level.
     values: Vec<Vec<f64>>,
     start_value: f64,
-    fine: bool,
 }
 
 /// Everything about a level that no sweep changes.
@@ -268,24 +283,11 @@ struct Expected {
 }
 
 impl<'a> Planner<'a> {
-    fn new(
-        frame: &'a Frame<'a>,
-        effects: Vec<Vec<Effect>>,
-        levels: Levels,
-        points: Option<usize>,
-    ) -> Self {
-        let length = frame.model.episode.length;
+    fn new(frame: &'a Frame<'a>, effects: Vec<Vec<Effect>>, levels: Levels) -> Self {
         let (reached, late) = reach(&levels, restarts(frame.model));
-        let mut planner = Self {
+        Self {
             ceiling: Ceiling::new(frame.model),
-            lattice: [
-                Axis {
-                    low: 0.0,
-                    step: 1.0,
-                    count: 1,
-                };
-                2
-            ],
+            lattice: [NO_AXIS; 2],
             frame,
             effects,
             reached,
@@ -293,28 +295,36 @@ impl<'a> Planner<'a> {
             values: Vec::new(),
             start_value: 0.0,
             levels,
-            fine: true,
-        };
-        let mut count = points.unwrap_or(if frame.is_real(1) { 601 } else { 2001 });
-        loop {
-            planner.lattice = [planner.axis(0, count), planner.axis(1, count)];
-            if points.is_some() || count <= 61 || planner.work(length) < WORK {
-                break;
-            }
-            count = count * 4 / 5;
         }
-        planner.fine = (0..2).filter(|&i| frame.is_real(i)).all(|i| {
-            let narrow = |&level: &usize| {
-                self::narrowest(&planner.levels, level, i) < 4.0 * planner.lattice[i].step.powi(2)
-            };
-            !planner.late.iter().any(narrow)
-        });
-        planner
+    }
+
+    fn lay(&mut self, count: usize) {
+        self.lattice = [self.axis(0, count), self.axis(1, count)];
+    }
+
+    /// Fewer points, if none are asked for and these are too much work.
+    fn coarsen(&mut self, mut count: usize, points: Option<usize>) {
+        while points.is_none() && count > COARSEST && self.work() > WORK {
+            count = count * 4 / 5;
+            self.lay(count);
+        }
+    }
+
+    /// Whether the grid can follow the rewards of every level that is come back to.
+    fn is_fine(&self) -> bool {
+        let narrow = |&level: &usize, i: usize| {
+            let predicted = self.levels.steps[level].iter().map(|step| step.predicted[i]);
+            let least = predicted.fold(self.levels.variances[level][i], f64::min);
+            least < 4.0 * self.lattice[i].step.powi(2)
+        };
+        let axes = (0..2).filter(|&i| self.frame.is_real(i));
+        !axes.into_iter().any(|i| self.late.iter().any(|level| narrow(level, i)))
     }
 
     /// Multiplications of all sweeps, about.
-    fn work(&self, length: usize) -> f64 {
-        let points = (self.lattice[0].count * self.lattice[1].count) as f64;
+    fn work(&self) -> f64 {
+        let length = self.frame.model.episode.length;
+        let points = self.size() as f64;
         let discount = self.frame.model.discount;
         let sweeps = (length.min(MOST_SWEEPS) as f64).min(20.0 / (1.0 - discount).max(1e-9));
         let taps = |level: usize, class: usize, i: usize| {
@@ -328,8 +338,8 @@ impl<'a> Planner<'a> {
             self.effects.len() as f64 * (smoothing + 6.0 * self.frame.class_of.len() as f64)
         };
         let late: f64 = self.late.iter().map(of_level).sum();
-        let early: f64 = self.reached.iter().flatten().map(of_level).sum();
-        points * (sweeps * late + early)
+        let early = self.reached.iter().take(length).flatten().map(of_level);
+        points * (sweeps * late + early.sum::<f64>())
     }
 
     /// Variance of the next mean around where it is expected.
@@ -342,11 +352,7 @@ impl<'a> Planner<'a> {
     /// About so many points, a whole number of them to every displacement if that can be.
     fn axis(&self, i: usize, count: usize) -> Axis {
         if !self.frame.is_real(i) {
-            return Axis {
-                low: 0.0,
-                step: 1.0,
-                count: 1,
-            };
+            return NO_AXIS;
         }
         let AxisModel { displacement, .. } = &self.frame.axes[i];
         let core = self.frame.core(i);
@@ -573,12 +579,9 @@ impl<'a> Planner<'a> {
         let edge = a * axis.at(point) + b;
         let cuts = &self.frame.axes[i].cuts;
         // Going outwards goes away from a cell on the inner side of the edge.
-        let falls = |cell: usize| {
-            a > 0.0
-                && match side {
-                    0 => cell > 0 && cuts[cell - 1] >= edge,
-                    _ => cell < cuts.len() && cuts[cell] <= edge,
-                }
+        let falls = |cell: usize| match towards(a, side) {
+            0 => cell > 0 && cuts[cell - 1] >= edge,
+            _ => cell < cuts.len() && cuts[cell] <= edge,
         };
         Reach {
             masses: masses[point].clone(),
@@ -794,25 +797,21 @@ impl<'a> Planner<'a> {
             return vec![ceiling; self.lattice[other].count];
         };
         let values = &self.values[self.index(mode, next)];
-        if (0..2).any(|axis| self.frame.axes[axis].a < 0.0) {
-            // Outwards is inwards one step on.
-            let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            return vec![most; self.lattice[other].count];
-        }
         let spread = self.spread(work.level, class);
         let law = |i: usize, side: usize| {
             let (axis, of) = (self.lattice[i], &self.frame.axes[i]);
             let edge = of.a * axis.at(side * (axis.count - 1)) + of.displacement[action];
             Law::normal(edge, spread[i].sqrt())
         };
-        let line = self.outwards(values, i, side, &law(i, side));
+        let out = |i: usize, side: usize| towards(self.frame.axes[i].a, side);
+        let line = self.outwards(values, i, out(i, side), &law(i, side));
         let averaged = self.average_line(&line, other, &work.kernels[class][other], spread[other]);
         let places = targets[other].places.iter().enumerate();
         places
             .map(|(point, &(below, on))| match self.outer_side(other, point) {
                 Some(side) => {
                     let weights = law(other, side).hats(&self.lattice[other]);
-                    dot(&weights, &most_outwards(line.clone(), side))
+                    dot(&weights, &most_outwards(line.clone(), out(other, side)))
                 }
                 None if on == 0.0 => averaged[below],
                 None => averaged[below] + on * (averaged[below + 1] - averaged[below]),
@@ -868,12 +867,6 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// The least variance under which an action is paid at a level.
-fn narrowest(levels: &Levels, level: usize, axis: usize) -> f64 {
-    let predicted = levels.steps[level].iter().map(|step| step.predicted[axis]);
-    predicted.fold(levels.variances[level][axis], f64::min)
-}
-
 /// Levels by step until what can still be reached no longer shrinks, and what can be reached from then on.
 fn reach(levels: &Levels, restarts: bool) -> (Vec<Vec<usize>>, Vec<usize>) {
     let mut starts = levels.starts.clone();
@@ -926,6 +919,14 @@ fn product(values: &[f64], weights: &[Vec<f64>; 2]) -> f64 {
             weight * row.iter().zip(&weights[1]).map(|(v, w)| v * w).sum::<f64>()
         })
         .sum()
+}
+
+/// The side to which everything beyond a side is taken by a motion that scales by `a`.
+pub(super) fn towards(a: f64, side: usize) -> usize {
+    match a < 0.0 {
+        true => 1 - side,
+        false => side,
+    }
 }
 
 /// The most from each point outwards.

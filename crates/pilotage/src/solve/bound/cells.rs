@@ -18,6 +18,8 @@ pub(super) struct Cells {
     open: [bool; 2],
     /// Whether what would move beyond an end stops at it.
     stops: bool,
+    /// Width of most cells.
+    resolution: f64,
 }
 
 impl Cells {
@@ -32,6 +34,7 @@ impl Cells {
                 ends: vec![-0.5, 0.5],
                 open: [false; 2],
                 stops: false,
+                resolution: 1.0,
             });
         }
         let of = &frame.axes[axis];
@@ -101,12 +104,18 @@ impl Cells {
                 ends,
                 open: walled.map(|walled| !walled),
                 stops: frame.walled,
+                resolution: width,
             }),
         }
     }
 
     pub fn count(&self) -> usize {
         self.ends.len() - 1 + usize::from(self.open[0]) + usize::from(self.open[1])
+    }
+
+    /// Width of the widest cells where it matters.
+    pub fn resolution(&self) -> f64 {
+        self.resolution
     }
 
     /// Number of ends of all cells.

@@ -23,6 +23,7 @@
 //!   exceed the integral of a function of its curvature, `step^2 E max_a'(V - Q) / (12 R)` about.
 //! - An agent that sees everything at all steps but the first few is only ever better off, which saves time in two dimensions.
 
+use super::beliefs::towards;
 use super::ceiling::Ceiling;
 use super::cells::Cells;
 use super::frame::{Frame, Noise};
@@ -37,6 +38,8 @@ use crate::parallel;
 const MOST_SWEEPS: usize = 20_000;
 /// Multiplications that all sweeps together may take.
 const WORK: f64 = 2e10;
+/// Fewest cells to which an axis is cut down to save work.
+const COARSEST: usize = 12;
 /// The second derivative of a Gaussian density of variance 1 has this integral where it is positive.
 const CURVATURE: f64 = 0.483_941_45;
 
@@ -100,13 +103,34 @@ pub(super) fn bound(
     if frame.walled && frame.model.map.is_some() {
         return Err("the walls of its map stop moves along both variables together".to_owned());
     }
-    let mut planner = Planner::new(frame, points)?;
-    Ok(planner.solve(observer))
+    let mut count = points.unwrap_or_else(|| suitable(frame));
+    loop {
+        let mut planner = Planner::new(frame, count)?;
+        if points.is_none() && count > COARSEST && planner.work() > WORK / 10.0 {
+            count = count * 3 / 4;
+            continue;
+        }
+        return Ok(planner.solve(observer));
+    }
+}
+
+/// Cells in what matters of an axis: several to a standard deviation of the noise, if that is not too many.
+fn suitable(frame: &Frame) -> usize {
+    let (least, most, share) = match frame.is_real(1) {
+        true => (48, 96, 3.0),
+        false => (160, 1200, 6.0),
+    };
+    let along = |i: usize| {
+        let noise = frame.classes.iter().map(|class| class[i].motion);
+        let narrowest = noise.filter(|variance| *variance > 0.0).fold(f64::INFINITY, f64::min);
+        frame.core(i).width() * share / narrowest.sqrt()
+    };
+    let wanted = if frame.is_real(1) { along(0).max(along(1)) } else { along(0) };
+    (wanted.min(f64::from(most)) as usize).max(least)
 }
 
 impl<'a> Planner<'a> {
-    fn new(frame: &'a Frame<'a>, points: Option<usize>) -> Result<Self, String> {
-        let count = points.unwrap_or(if frame.is_real(1) { 32 } else { 160 }).max(2);
+    fn new(frame: &'a Frame<'a>, count: usize) -> Result<Self, String> {
         let cells = [Cells::new(frame, 0, count)?, Cells::new(frame, 1, count)?];
         let moves: Result<Vec<[Moves; 2]>, String> = (0..frame.classes.len())
             .map(|class| Ok([moves(frame, &cells[0], class, 0)?, moves(frame, &cells[1], class, 1)?]))
@@ -381,13 +405,8 @@ impl<'a> Planner<'a> {
         let edge = of.a * self.cells[i].outer_end(side) + of.displacement[action];
         let law = Law::normal(edge, self.frame.noise(action, i).motion.sqrt());
         let weights = self.cells[i].weights(&law, true);
-        let beyond = |group: usize| {
-            let outwards = &expected[group].outwards[i][side];
-            match of.a >= 0.0 {
-                true => dot(&weights, outwards),
-                false => outwards.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            }
-        };
+        let out = towards(of.a, side);
+        let beyond = |group: usize| dot(&weights, &expected[group].outwards[i][out]);
         let counts = [self.cells[0].count(), self.cells[1].count()];
         let worth = (0..counts[1 - i]).map(|across| {
             let index = match i {
@@ -450,8 +469,7 @@ struct Expected {
 fn moves(frame: &Frame, cells: &Cells, class: usize, axis: usize) -> Result<Moves, String> {
     let noise = frame.classes[class][axis];
     let of = &frame.axes[axis];
-    let narrow = cells.span(usize::from(cells.open_side(0).is_some()));
-    let resolution = narrow.1 - narrow.0;
+    let resolution = cells.resolution();
     let mut keys: Vec<f64> = Vec::new();
     let mut from = Vec::new();
     for action in 0..frame.class_of.len() {
