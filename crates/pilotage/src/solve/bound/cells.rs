@@ -95,18 +95,18 @@ impl Cells {
             let beyond = pair[1] <= core.low - margin || pair[0] >= core.high + margin;
             let parts = (length / width - 1e-6).ceil().max(1.0);
             let parts = if beyond { parts.min(8.0) } else { parts };
+            if ends.len() as f64 + parts > MOST as f64 {
+                return Err("it reaches too far for a grid as fine as its noise".to_owned());
+            }
             ends.extend((1..parts as usize).map(|k| pair[0] + length * k as f64 / parts));
             ends.push(pair[1]);
         }
-        match ends.len() > MOST {
-            true => Err("its regions are too small for a grid".to_owned()),
-            false => Ok(Self {
-                ends,
-                open: walled.map(|walled| !walled),
-                stops: frame.walled,
-                resolution: width,
-            }),
-        }
+        Ok(Self {
+            ends,
+            open: walled.map(|walled| !walled),
+            stops: frame.walled,
+            resolution: width,
+        })
     }
 
     pub fn count(&self) -> usize {
@@ -159,8 +159,8 @@ impl Cells {
         }
     }
 
-    /// Weights of all ends of cells in the expectation of a function that is linear in every cell. What would be beyond a wall is at
-    /// it, unless only what has `stopped` nowhere is asked for.
+    /// Weights of all ends of cells in the expectation of a function that is linear in every cell. What would be beyond a wall stops
+    /// at it, or is left out.
     pub fn weights(&self, law: &Law, with_stopped: bool) -> Vec<f64> {
         let mut weights = vec![0.0; self.places()];
         let first = usize::from(self.open[0]);

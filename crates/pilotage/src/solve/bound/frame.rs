@@ -53,7 +53,9 @@ impl<'a> Frame<'a> {
     pub fn new(model: &'a Model) -> Result<Self, String> {
         let n = model.state_dim();
         if n > 2 {
-            return Err(format!("it has {n} state variables, and more than 2 take too fine a grid"));
+            return Err(format!(
+                "it has {n} state variables, and more than 2 take too fine a grid"
+            ));
         }
         if !is_diagonal(&model.motion.a) {
             return Err("its motion mixes the state variables".to_owned());
@@ -217,7 +219,10 @@ pub(super) fn cuts(model: &Model, axis: usize) -> Vec<f64> {
     let events = model.events.iter().map(|event| &event.region);
     let regions = rewards.chain(events).chain([&model.episode.alive]);
     let ends = |region: &Region| {
-        let sides = region.sides.iter().filter(|(variable, _)| *variable == axis);
+        let sides = region
+            .sides
+            .iter()
+            .filter(|(variable, _)| *variable == axis);
         let ends = sides.flat_map(|(_, side)| [side.low, side.high]);
         ends.filter(|end| end.is_finite()).collect::<Vec<_>>()
     };

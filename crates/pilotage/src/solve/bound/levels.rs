@@ -153,8 +153,7 @@ impl Levels {
 
 /// One step of the Riccati recursion along each axis: before and after the reading.
 fn advance(a: [f64; 2], class: &[Noise; 2], from: Variances) -> (Variances, Variances) {
-    let predicted: Variances =
-        std::array::from_fn(|i| a[i] * a[i] * from[i] + class[i].motion);
+    let predicted: Variances = std::array::from_fn(|i| a[i] * a[i] * from[i] + class[i].motion);
     let left = std::array::from_fn(|i| {
         // Also where nothing is left to be told, so that an endless precision is none.
         match predicted[i] > 0.0 {

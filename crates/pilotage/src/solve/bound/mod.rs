@@ -114,15 +114,7 @@ impl Bound {
 /// [`Error::Setting`] for settings out of range; [`Error::Unsupported`] for a model with a quadratic cost, whose best value is known
 /// in closed form ([`crate::solve::lqg`]), and for rewards too large to be added.
 pub fn bound(model: &Model, settings: &Settings, observer: &dyn Observer) -> Result<Bound> {
-    if let Some(points) = settings.points
-        && !(2..=MOST_POINTS).contains(&points)
-    {
-        return Err(Error::Setting {
-            setting: "points",
-            value: points.to_string(),
-            range: "from 2 to 20000",
-        });
-    }
+    check(model, settings)?;
     let refuse = |reason: &str| {
         Err(Error::Unsupported {
             solver: "the upper bound",
@@ -157,8 +149,20 @@ pub fn bound(model: &Model, settings: &Settings, observer: &dyn Observer) -> Res
     })
 }
 
-/// Most points of a grid along a variable.
-const MOST_POINTS: usize = 20_000;
+fn check(model: &Model, settings: &Settings) -> Result<()> {
+    let (most, range) = match model.state_dim() {
+        1 => (20_000, "from 2 to 20000 for one variable"),
+        _ => (800, "from 2 to 800 for two variables"),
+    };
+    match settings.points {
+        Some(points) if !(2..=most).contains(&points) => Err(Error::Setting {
+            setting: "points",
+            value: points.to_string(),
+            range,
+        }),
+        _ => Ok(()),
+    }
+}
 
 /// The least bound that is known for the model.
 fn least(model: &Model, settings: &Settings, observer: &dyn Observer) -> (f64, Method) {

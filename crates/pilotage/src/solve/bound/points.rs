@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use super::step::{After, after, before};
 use crate::belief::gaussian::normal_cdf;
 use crate::belief::kalman::square_root;
-use crate::model::{ActionId, Model, ModeId, Then};
+use crate::model::{ActionId, ModeId, Model, Then};
 
 /// Most sweeps; what an episode that is longer can still bring is bounded by the ceiling.
 const MOST_SWEEPS: usize = 20_000;
@@ -36,7 +36,12 @@ pub(super) fn bound(model: &Model) -> Result<f64, String> {
     };
     let still = model.motion.a == nalgebra::DMatrix::identity(n, n)
         && (0..model.actions.len()).all(at_rest);
-    if !still || model.start.iter().any(|start| start.covariance.amax() > 0.0) {
+    if !still
+        || model
+            .start
+            .iter()
+            .any(|start| start.covariance.amax() > 0.0)
+    {
         return Err("its state is not at rest at one of two points".to_owned());
     }
     if first.mode != second.mode {
@@ -108,7 +113,11 @@ impl Grid {
     fn new(start: f64) -> Self {
         let count = (FARTHEST / STEP) as i32;
         let mut odds: Vec<f64> = (-count..=count).map(|k| f64::from(k) * STEP).collect();
-        odds.extend([f64::NEG_INFINITY, f64::INFINITY, (start / (1.0 - start)).ln()]);
+        odds.extend([
+            f64::NEG_INFINITY,
+            f64::INFINITY,
+            (start / (1.0 - start)).ln(),
+        ]);
         odds.sort_by(f64::total_cmp);
         odds.dedup();
         let chances = odds.iter().map(|&odds| chance(odds)).collect();
@@ -181,7 +190,10 @@ fn value(
     let rest = super::ceiling::Ceiling::new(model).within(model.episode.length - sweeps);
     let mut values = vec![vec![rest; size]; effects.len()];
     let mut start_value = rest;
-    let place = grid.chances.iter().position(|&p| p >= chance((start / (1.0 - start)).ln()));
+    let place = grid
+        .chances
+        .iter()
+        .position(|&p| p >= chance((start / (1.0 - start)).ln()));
     let place = place.unwrap_or(size - 1);
     for _ in 0..sweeps {
         let expect = |class: usize, mode: ModeId| -> Vec<f64> {
@@ -195,14 +207,19 @@ fn value(
             let of = |(action, effect): (ActionId, &Effect)| {
                 let p = grid.chances[at];
                 let future = match effect.then {
-                    Then::Continue => class_of(action)
-                        .map_or(0.0, |class| expected[class][effect.mode][at]),
+                    Then::Continue => {
+                        class_of(action).map_or(0.0, |class| expected[class][effect.mode][at])
+                    }
                     Then::Restart => start_value,
                     Then::End => 0.0,
                 };
                 (1.0 - p) * effect.rewards[0] + p * effect.rewards[1] + model.discount * future
             };
-            effects[mode].iter().enumerate().map(of).fold(f64::NEG_INFINITY, f64::max)
+            effects[mode]
+                .iter()
+                .enumerate()
+                .map(of)
+                .fold(f64::NEG_INFINITY, f64::max)
         };
         let fresh: Vec<Vec<f64>> = (0..effects.len())
             .map(|mode| (0..size).map(|at| worth(mode, at)).collect())

@@ -63,9 +63,7 @@ pub(super) fn after(
     };
     After {
         reward: paid(model, When::After, mode, action, at) + reward_of(event),
-        mode: event
-            .and_then(|event| event.becomes)
-            .unwrap_or(before.mode),
+        mode: event.and_then(|event| event.becomes).unwrap_or(before.mode),
         then: event.map_or(Then::Continue, |event| event.then),
     }
 }

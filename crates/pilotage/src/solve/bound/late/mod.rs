@@ -23,46 +23,25 @@
 //!   exceed the integral of a function of its curvature, `step^2 E max_a'(V - Q) / (12 R)` about.
 //! - An agent that sees everything at all steps but the first few is only ever better off, which saves time in two dimensions.
 
+mod moves;
+
 use super::beliefs::towards;
 use super::ceiling::Ceiling;
 use super::cells::Cells;
-use super::frame::{Frame, Noise};
+use super::frame::Frame;
 use super::law::Law;
 use super::step::{After, Before, after, before};
-use crate::belief::gaussian::normal_density;
 use crate::model::{ActionId, ModeId, Then};
 use crate::observe::Observer;
 use crate::parallel;
+use moves::{Moves, Place, moves};
 
 /// Most sweeps; an episode that is longer begins them with the ceiling.
 const MOST_SWEEPS: usize = 20_000;
 /// Multiplications that all sweeps together may take.
-const WORK: f64 = 2e10;
+const WORK: f64 = 1e10;
 /// Fewest cells to which an axis is cut down to save work.
 const COARSEST: usize = 12;
-/// The second derivative of a Gaussian density of variance 1 has this integral where it is positive.
-const CURVATURE: f64 = 0.483_941_45;
-
-/// One place along an axis from which the noise carries on, and what can be sensed of where it ends.
-#[derive(Debug)]
-struct Place {
-    /// Weights of the ends of all cells in an expectation.
-    flat: Vec<f64>,
-    /// The same, weighted by the density of a reading: a share of `flat` for each reading. From which end on, and the weights.
-    readings: Vec<(usize, Vec<f64>)>,
-}
-
-/// Where the actions of a class lead along an axis.
-#[derive(Debug)]
-struct Moves {
-    places: Vec<Place>,
-    /// By action of the model and end of a cell; open cells and actions of other classes have none.
-    from: Vec<Vec<usize>>,
-    /// What the sum over readings may exceed the integral by, for what is at stake.
-    loss: f64,
-    /// What a chord may lie below the function, by cell, for its range.
-    gap: Vec<f64>,
-}
 
 /// What a move can lead to: the same for many modes and actions.
 #[derive(Debug)]
@@ -103,7 +82,8 @@ pub(super) fn bound(
     if frame.walled && frame.model.map.is_some() {
         return Err("the walls of its map stop moves along both variables together".to_owned());
     }
-    let mut count = points.unwrap_or_else(|| suitable(frame));
+    let finest = if frame.is_real(1) { 128 } else { 1500 };
+    let mut count = points.map_or_else(|| suitable(frame), |points| points.min(finest));
     loop {
         let mut planner = Planner::new(frame, count)?;
         if points.is_none() && count > COARSEST && planner.work() > WORK / 10.0 {
@@ -122,10 +102,16 @@ fn suitable(frame: &Frame) -> usize {
     };
     let along = |i: usize| {
         let noise = frame.classes.iter().map(|class| class[i].motion);
-        let narrowest = noise.filter(|variance| *variance > 0.0).fold(f64::INFINITY, f64::min);
+        let narrowest = noise
+            .filter(|variance| *variance > 0.0)
+            .fold(f64::INFINITY, f64::min);
         frame.core(i).width() * share / narrowest.sqrt()
     };
-    let wanted = if frame.is_real(1) { along(0).max(along(1)) } else { along(0) };
+    let wanted = if frame.is_real(1) {
+        along(0).max(along(1))
+    } else {
+        along(0)
+    };
     (wanted.min(f64::from(most)) as usize).max(least)
 }
 
@@ -133,7 +119,12 @@ impl<'a> Planner<'a> {
     fn new(frame: &'a Frame<'a>, count: usize) -> Result<Self, String> {
         let cells = [Cells::new(frame, 0, count)?, Cells::new(frame, 1, count)?];
         let moves: Result<Vec<[Moves; 2]>, String> = (0..frame.classes.len())
-            .map(|class| Ok([moves(frame, &cells[0], class, 0)?, moves(frame, &cells[1], class, 1)?]))
+            .map(|class| {
+                Ok([
+                    moves(frame, &cells[0], class, 0)?,
+                    moves(frame, &cells[1], class, 1)?,
+                ])
+            })
             .collect();
         let model = frame.model;
         let (modes, actions) = (model.modes.len(), model.actions.len());
@@ -149,7 +140,11 @@ impl<'a> Planner<'a> {
             cells,
         };
         planner.begins = (0..modes)
-            .map(|mode| (0..actions).map(|action| planner.begin(mode, action)).collect())
+            .map(|mode| {
+                (0..actions)
+                    .map(|action| planner.begin(mode, action))
+                    .collect()
+            })
             .collect();
         Ok(planner)
     }
@@ -164,14 +159,14 @@ impl<'a> Planner<'a> {
         let mut begins = Vec::with_capacity(all.len());
         for at in &all {
             let before = before(frame.model, mode, action, frame.state(at));
-            let alike = |other: &Before| {
-                (other.mode, other.happened) == (before.mode, before.happened)
-            };
+            let alike =
+                |other: &Before| (other.mode, other.happened) == (before.mode, before.happened);
             let found = known.iter().find(|(other, _)| alike(other));
             let group = match (before.then, found) {
                 (Then::Continue, Some(found)) => found.1,
                 (Then::Continue, None) => {
-                    let to = |at: &[f64; 2]| after(frame.model, mode, action, &before, frame.state(at));
+                    let to =
+                        |at: &[f64; 2]| after(frame.model, mode, action, &before, frame.state(at));
                     let group = self.group(frame.class_of[action], all.iter().map(to).collect());
                     known.push((before, group));
                     group
@@ -224,7 +219,11 @@ impl<'a> Planner<'a> {
         let length = self.frame.model.episode.length;
         let sweeps = length.min(MOST_SWEEPS);
         let mut ceiling = self.ceiling.within(length - sweeps);
-        self.q.iter_mut().flatten().flatten().for_each(|q| *q = ceiling);
+        self.q
+            .iter_mut()
+            .flatten()
+            .flatten()
+            .for_each(|q| *q = ceiling);
         self.start_value = ceiling;
         let late = sweeps.min((WORK / self.work()).max(1.0) as usize);
         for (count, told_late) in [(sweeps - late, false), (late, true)] {
@@ -233,7 +232,11 @@ impl<'a> Planner<'a> {
                 let further = self.sweep(told_late, ceiling);
                 observer.progress("bound", sweep as u64 + 1, count as u64);
                 if let Some(further) = further {
-                    self.q.iter_mut().flatten().flatten().for_each(|q| *q += further);
+                    self.q
+                        .iter_mut()
+                        .flatten()
+                        .flatten()
+                        .for_each(|q| *q += further);
                     self.start_value += further;
                     ceiling = f64::INFINITY;
                     break;
@@ -318,8 +321,8 @@ impl<'a> Planner<'a> {
             let sensed: Vec<Vec<f64>> = gaps.iter().map(|gap| sense(gap, rows, from)).collect();
             let at = |place: &Place| {
                 let expected = dot(&place.flat, &worths);
-                let price = price(&sensed, from.readings.len(), place)
-                    - loss * dot(&place.flat, &stakes);
+                let price =
+                    price(&sensed, from.readings.len(), place) - loss * dot(&place.flat, &stakes);
                 expected - model.discount * price.max(0.0)
             };
             y.places.iter().map(at).collect::<Vec<f64>>()
@@ -465,137 +468,6 @@ struct Expected {
     outwards: [[Vec<f64>; 2]; 2],
 }
 
-/// The moves of a class along an axis.
-fn moves(frame: &Frame, cells: &Cells, class: usize, axis: usize) -> Result<Moves, String> {
-    let noise = frame.classes[class][axis];
-    let of = &frame.axes[axis];
-    let resolution = cells.resolution();
-    let mut keys: Vec<f64> = Vec::new();
-    let mut from = Vec::new();
-    for action in 0..frame.class_of.len() {
-        let mut places = vec![usize::MAX; cells.places()];
-        if frame.class_of[action] == class {
-            for (end, place) in places.iter_mut().enumerate() {
-                let (cell, side) = (end / 2, end % 2);
-                if cells.open_side(cell).is_some() {
-                    continue;
-                }
-                let key = match noise.motion > 0.0 {
-                    true => {
-                        let (low, high) = cells.span(cell);
-                        of.a * [low, high][side] + of.displacement[action]
-                    }
-                    false => cells.shifted(cell, side, of.displacement[action])? as f64,
-                };
-                let near = |known: &f64| (known - key).abs() <= 1e-7 * resolution.min(1.0);
-                *place = keys.iter().position(near).unwrap_or_else(|| {
-                    keys.push(key);
-                    keys.len() - 1
-                });
-            }
-        }
-        from.push(places);
-    }
-    let step = match frame.is_real(1) {
-        true => 0.5,
-        false => 1.0 / 6.0,
-    };
-    let places = parallel::map(keys.len(), |key| {
-        place(cells, noise, keys[key], resolution, step)
-    });
-    let weighs_readings = noise.motion > 0.0
-        && noise.precision > 0.0
-        && 1.0 / noise.precision > resolution * resolution;
-    let gap = |cell: usize| match cells.open_side(cell) {
-        None if noise.motion > 0.0 => {
-            let (low, high) = cells.span(cell);
-            let width = of.a * (high - low);
-            (CURVATURE * width * width / (8.0 * noise.motion)).min(1.0)
-        }
-        _ => 0.0,
-    };
-    Ok(Moves {
-        places,
-        from,
-        loss: match weighs_readings {
-            // The integral of the curvature of a Gaussian density, and what a sum of its largest values in each step may add.
-            true => step * step / 12.0 * (2.0 * CURVATURE + 1.51 * step),
-            false => 0.0,
-        },
-        gap: (0..cells.count()).map(gap).collect(),
-    })
-}
-
-/// Where the noise carries on to from a place, and what readings say of it, a `step` apart in units of their noise. Those too exact
-/// for the grid are taken for exact.
-fn place(cells: &Cells, noise: Noise, key: f64, resolution: f64, step: f64) -> Place {
-    let unit = |place: usize, weight: f64| (place, vec![weight]);
-    if noise.motion <= 0.0 {
-        let mut flat = vec![0.0; cells.places()];
-        flat[key as usize] = 1.0;
-        return Place {
-            readings: vec![unit(key as usize, 1.0)],
-            flat,
-        };
-    }
-    let law = Law::normal(key, noise.motion.sqrt());
-    let flat = cells.weights(&law, true);
-    if noise.precision <= 0.0 {
-        return Place {
-            readings: vec![(0, flat.clone())],
-            flat,
-        };
-    }
-    let variance = 1.0 / noise.precision;
-    if variance <= resolution * resolution {
-        let seen = flat.iter().enumerate().filter(|(_, weight)| **weight > 1e-12);
-        return Place {
-            readings: seen.map(|(place, &weight)| unit(place, weight)).collect(),
-            flat,
-        };
-    }
-    let sd = variance.sqrt();
-    let [low, high] = cells.stops();
-    let within = |x: f64| {
-        x.max(low.unwrap_or(f64::NEG_INFINITY))
-            .min(high.unwrap_or(f64::INFINITY))
-    };
-    let from = within(key - 5.0 * law.sd) - 5.0 * sd;
-    let to = within(key + 5.0 * law.sd) + 5.0 * sd;
-    let total = (noise.motion + variance).sqrt();
-    let share = noise.motion / (noise.motion + variance);
-    let density = |o: f64, mean: f64, sd: f64| normal_density((o - mean) / sd) / sd;
-    let count = ((to - from) / (step * sd)).ceil() as usize;
-    let reading = |k: usize| {
-        let o = from + k as f64 * step * sd;
-        let held = Law::normal(key + share * (o - key), (share * variance).sqrt());
-        let weigh = density(o, key, total) * step * sd;
-        let mut weights = cells.weights(&held, false);
-        weights.iter_mut().for_each(|weight| *weight *= weigh);
-        let last = weights.len() - 1;
-        for (side, wall) in [low, high].into_iter().enumerate() {
-            if let Some(wall) = wall {
-                let stopped = match side {
-                    0 => law.below(wall),
-                    _ => 1.0 - law.below(wall),
-                };
-                weights[side * last] += stopped * density(o, wall, sd) * step * sd;
-            }
-        }
-        // Left out, a weight only lowers the price.
-        let first = weights.iter().position(|weight| *weight > 1e-9);
-        let end = weights.iter().rposition(|weight| *weight > 1e-9);
-        match (first, end) {
-            (Some(first), Some(end)) => Some((first, weights[first..=end].to_vec())),
-            _ => None,
-        }
-    };
-    Place {
-        readings: (0..=count).filter_map(reading).collect(),
-        flat,
-    }
-}
-
 /// The expectation along the first axis, by place of the second.
 fn along(turned: &[f64], rows: usize, weights: &[f64]) -> Vec<f64> {
     let columns = turned.chunks_exact(rows);
@@ -627,7 +499,9 @@ fn price(sensed: &[Vec<f64>], readings: usize, place: &Place) -> f64 {
             sum.fill(0.0);
             let lines = sensed[from * readings..].chunks_exact(readings.max(1));
             for (weight, line) in weights.iter().zip(lines) {
-                sum.iter_mut().zip(line).for_each(|(sum, x)| *sum += weight * x);
+                sum.iter_mut()
+                    .zip(line)
+                    .for_each(|(sum, x)| *sum += weight * x);
             }
             match action {
                 0 => least.copy_from_slice(&sum),
