@@ -38,8 +38,8 @@ use moves::{Moves, Place, moves};
 
 /// Most sweeps; an episode that is longer begins them with the ceiling.
 const MOST_SWEEPS: usize = 20_000;
-/// Multiplications that all sweeps together may take.
-const WORK: f64 = 1e10;
+/// Multiplications that all sweeps together may take, by number of variables.
+const WORK: [f64; 2] = [1e10, 3e10];
 /// Fewest cells to which an axis is cut down to save work.
 const COARSEST: usize = 12;
 
@@ -86,7 +86,7 @@ pub(super) fn bound(
     let mut count = points.map_or_else(|| suitable(frame), |points| points.min(finest));
     loop {
         let mut planner = Planner::new(frame, count)?;
-        if points.is_none() && count > COARSEST && planner.work() > WORK / 10.0 {
+        if points.is_none() && count > COARSEST && planner.work() > planner.affordable() / 10.0 {
             count = count * 3 / 4;
             continue;
         }
@@ -196,6 +196,11 @@ impl<'a> Planner<'a> {
         place / columns / 2 * self.cells[1].count() + place % columns / 2
     }
 
+    /// Multiplications that all such sweeps together may take.
+    fn affordable(&self) -> f64 {
+        WORK[usize::from(self.frame.is_real(1))]
+    }
+
     /// Multiplications of a sweep in which readings are weighed.
     fn work(&self) -> f64 {
         let actions = self.frame.class_of.len() as f64;
@@ -225,7 +230,7 @@ impl<'a> Planner<'a> {
             .flatten()
             .for_each(|q| *q = ceiling);
         self.start_value = ceiling;
-        let late = sweeps.min((WORK / self.work()).max(1.0) as usize);
+        let late = sweeps.min((self.affordable() / self.work()).max(1.0) as usize);
         for (count, told_late) in [(sweeps - late, false), (late, true)] {
             for sweep in 0..count {
                 ceiling = self.ceiling.one_more(ceiling);
