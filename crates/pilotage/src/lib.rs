@@ -31,6 +31,7 @@
 //! ```
 
 pub mod belief;
+mod digest;
 pub mod error;
 pub mod model;
 pub mod observe;

@@ -10,6 +10,7 @@ mod cart_pole;
 mod error;
 mod file;
 mod file_value;
+mod fingerprint;
 mod locate;
 mod map;
 mod read;
@@ -26,6 +27,7 @@ pub use barriers::Barriers;
 pub use builtin::{builtin, find, names};
 pub use error::{Fault, ModelError, Path, Place, Step, suggest};
 pub use file::schema;
+pub use fingerprint::{Fingerprint, NotAFingerprint};
 pub use map::Map;
 pub use read::{load, read};
 pub use region::{Interval, Region};
@@ -395,21 +397,6 @@ impl Model {
     /// Displacement `B u` of an action.
     pub fn displacement(&self, action: ActionId) -> DVector<f64> {
         &self.motion.b * &self.actions[action].control
-    }
-
-    /// A number that changes when anything a policy depends on changes; name and description do not count.
-    pub fn fingerprint(&self) -> u64 {
-        let nameless = Self {
-            name: String::new(),
-            about: String::new(),
-            ..self.clone()
-        };
-        // FNV-1a over the text of every field: any change of a number changes it, and it is the same on every machine.
-        format!("{nameless:?}")
-            .bytes()
-            .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-            })
     }
 
     /// The model with another belief about walls.

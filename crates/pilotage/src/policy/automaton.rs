@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 
 use crate::belief::{Belief, BeliefMdp, Filter, LevelId};
-use crate::model::{ActionId, ModeId};
+use crate::model::{ActionId, Fingerprint, ModeId};
 use crate::policy::{Coordinates, Policy};
 
 /// Index into [`Automaton::nodes`].
@@ -17,7 +17,7 @@ pub struct Automaton {
     /// Name of the problem it was made for.
     pub problem: String,
     /// [`crate::model::Model::fingerprint`] of that problem.
-    pub fingerprint: u64,
+    pub fingerprint: Fingerprint,
     /// Name of the solver that made it.
     pub solver: String,
     /// How a belief finds its node.

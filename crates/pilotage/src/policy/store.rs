@@ -100,6 +100,13 @@ impl Automaton {
                 "this policy is for {}, not for {}; solve {} to get one",
                 self.problem, model.name, model.name
             )
+        } else if !self.fingerprint.comparable(&model.fingerprint()) {
+            format!(
+                "this policy names its problem by the fingerprint {}, which this version cannot compare with that of {}, {}; solve it again",
+                self.fingerprint,
+                model.name,
+                model.fingerprint()
+            )
         } else if self.fingerprint != model.fingerprint() {
             format!(
                 "{} has changed since this policy was made; solve it again",
