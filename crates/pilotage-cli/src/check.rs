@@ -5,7 +5,7 @@ use std::io::Write;
 use clap::Args;
 use pilotage::Error;
 use pilotage::belief::BeliefMdp;
-use pilotage::model;
+use pilotage::scenario;
 use pilotage::solve::SolverKind;
 use serde_json::json;
 
@@ -27,10 +27,10 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let Some(file) = &arguments.file else {
-        writeln!(out, "{:#}", model::schema().as_value())?;
+        writeln!(out, "{:#}", scenario::schema().as_value())?;
         return Ok(());
     };
-    let model = model::find(file)?;
+    let model = scenario::find(file)?.model;
     let mdp = BeliefMdp::new(&model);
     let levels = mdp.levels();
     let sd = |level: usize| -> Vec<f64> {

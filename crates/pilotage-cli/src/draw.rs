@@ -24,8 +24,9 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let (automaton, model) = policy_and_problem(&arguments.policy, arguments.problem.as_deref())?;
-    let mdp = BeliefMdp::new(&model);
+    let (automaton, scenario) =
+        policy_and_problem(&arguments.policy, arguments.problem.as_deref())?;
+    let mdp = BeliefMdp::new(&scenario.model);
     let pictures = [
         ("automaton.svg", automaton_svg(&automaton)?),
         (

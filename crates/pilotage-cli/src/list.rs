@@ -5,7 +5,7 @@ use std::io::Write;
 use clap::Args;
 use comfy_table::presets;
 use comfy_table::{ContentArrangement, Table};
-use pilotage::model;
+use pilotage::scenario;
 use pilotage::solve::SolverKind;
 use serde_json::json;
 
@@ -19,8 +19,8 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let models = model::names()
-        .map(model::find)
+    let models = scenario::names()
+        .map(|name| scenario::find(name).map(|scenario| scenario.model))
         .collect::<Result<Vec<_>, _>>()?;
     let mut out = std::io::stdout().lock();
     if arguments.json {

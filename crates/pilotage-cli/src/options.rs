@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use pilotage::model::{self, Model};
 use pilotage::policy::Automaton;
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate;
 
 use crate::failure::Failure;
@@ -59,11 +59,11 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 pub fn policy_and_problem(
     policy: &Path,
     problem: Option<&str>,
-) -> Result<(Automaton, Model), Failure> {
+) -> Result<(Automaton, Scenario), Failure> {
     let automaton = Automaton::load(policy)?;
-    let model = model::find(problem.unwrap_or(&automaton.problem))?;
-    automaton.check_problem(&model, &policy.display().to_string())?;
-    Ok((automaton, model))
+    let scenario = scenario::find(problem.unwrap_or(&automaton.problem))?;
+    automaton.check_problem(&scenario.model, &policy.display().to_string())?;
+    Ok((automaton, scenario))
 }
 
 /// A file name beside `path`: its stem, a dash, and `suffix`.

@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use clap::Args;
 use pilotage::belief::BeliefMdp;
-use pilotage::model::{self, Model};
 use pilotage::policy::{Automaton, Controller};
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::evaluate;
 use pilotage::simulate::wake_up::{Settings, measure};
 use serde_json::json;
@@ -39,16 +39,16 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.evaluation.start_threads()?;
-    let (automaton, model) = policy_and_problem(&arguments.policy, Some(&arguments.problem))?;
+    let (automaton, scenario) = policy_and_problem(&arguments.policy, Some(&arguments.problem))?;
     let bars = Bars::new(arguments.json);
     if arguments.wake_up {
-        return wake_up(arguments, &model, &automaton, &bars);
+        return wake_up(arguments, &scenario, &automaton, &bars);
     }
     let world = match &arguments.world {
-        None => model,
+        None => scenario,
         Some(world) => {
-            let world = model::find(world)?;
-            automaton.check_world(&world, &arguments.policy.display().to_string())?;
+            let world = scenario::find(world)?;
+            automaton.check_world(&world.model, &arguments.policy.display().to_string())?;
             world
         }
     };
@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     if arguments.json {
         let mut report = identity(&automaton, arguments.evaluation.seed);
-        report["world"] = json!(world.name);
+        report["world"] = json!(world.model.name);
         report["planned_value"] = json!(automaton.planned_value);
         report["evaluation"] = json!(evaluation);
         report["seconds"] = json!({ "evaluate": seconds });
@@ -73,7 +73,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         writeln!(
             out,
             "{}",
-            summary::heading(&world.name, &automaton.solver, Some(automaton.nodes.len()))
+            summary::heading(
+                &world.model.name,
+                &automaton.solver,
+                Some(automaton.nodes.len())
+            )
         )?;
         write!(
             out,
@@ -86,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn wake_up(
     arguments: &Arguments,
-    model: &Model,
+    Scenario { model, truth }: &Scenario,
     automaton: &Automaton,
     bars: &Bars,
 ) -> Result<(), Failure> {
@@ -97,7 +101,7 @@ fn wake_up(
     };
     let clock = Instant::now();
     let policy = Controller::new(automaton);
-    let result = measure(&BeliefMdp::new(model), &policy, &settings, bars)?;
+    let result = measure(&BeliefMdp::new(model), truth, &policy, &settings, bars)?;
     let mut out = std::io::stdout().lock();
     if arguments.json {
         let mut report = identity(automaton, settings.seed);

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use pilotage::model::{self, Model, WallBelief, Walls};
+use pilotage::model::WallBelief;
 use pilotage::policy::write_whole;
 use pilotage::report::{returns_svg, values_svg};
+use pilotage::scenario::{self, Scenario, Walls};
 use pilotage::simulate::{Estimate, Evaluation as Earned};
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
 use pilotage::solve::lqg::Weights;
@@ -223,28 +224,28 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             solver.name()
         )));
     }
-    let model = model::find(&arguments.problem)?;
+    let scenario = scenario::find(&arguments.problem)?;
     arguments.evaluation.start_threads()?;
     let bars = Bars::new(arguments.json);
 
     let clock = Instant::now();
-    let solution = solve(solver, &model, &settings, &bars)?;
+    let solution = solve(solver, &scenario, &settings, &bars)?;
     let solve_seconds = clock.elapsed().as_secs_f64();
     if let (Some(path), Some(automaton)) = (&arguments.out, solution.automaton()) {
         automaton.save(path)?;
     }
     let curves = arguments.learner.draw(&solution)?;
     let clock = Instant::now();
-    let earned = solution.evaluate(&model, arguments.evaluation.options(), &bars);
+    let earned = solution.evaluate(&scenario, arguments.evaluation.options(), &bars)?;
     let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
     let lost = arguments
         .value_lost
-        .then(|| value_lost(arguments, solver, &model, &settings, &solution, &bars))
+        .then(|| value_lost(arguments, solver, &scenario, &settings, &solution, &bars))
         .transpose()?;
 
     let mut out = std::io::stdout().lock();
     if arguments.json {
-        let mut report = report(arguments, &model, solver, &solution, &earned, seconds);
+        let mut report = report(arguments, &scenario, solver, &solution, &earned, seconds);
         if let Some(lost) = lost {
             report["value_lost"] = json!(lost);
         }
@@ -253,7 +254,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         write!(
             out,
             "{}",
-            shown(arguments, &model, solver, &solution, &earned, seconds)
+            shown(arguments, &scenario, solver, &solution, &earned, seconds)
         )?;
         if let Some(lost) = lost {
             writeln!(
@@ -273,7 +274,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn value_lost(
     arguments: &Arguments,
     solver: SolverKind,
-    model: &Model,
+    scenario: &Scenario,
     settings: &SolveSettings,
     solution: &Solution,
     bars: &Bars,
@@ -282,16 +283,16 @@ fn value_lost(
         form: Form::Grid,
         ..settings.clone()
     };
-    let planner = solve(solver, model, &uncompiled, bars)?;
+    let planner = solve(solver, scenario, &uncompiled, bars)?;
     let options = arguments.evaluation.options();
     solution
-        .value_lost(&planner, model, options, bars)
+        .value_lost(&planner, scenario, options, bars)
         .ok_or_else(|| Failure::Usage("--value-lost compares an automaton with the planner it was compiled from; choose --policy nearest or segments".to_owned()))
 }
 
 fn report(
     arguments: &Arguments,
-    model: &Model,
+    scenario: &Scenario,
     solver: SolverKind,
     solution: &Solution,
     earned: &Earned,
@@ -299,7 +300,7 @@ fn report(
 ) -> serde_json::Value {
     json!({
         "pilotage": env!("CARGO_PKG_VERSION"),
-        "problem": model.name,
+        "problem": scenario.model.name,
         "solver": solver.name(),
         "policy": solution.automaton().map_or(json!(arguments.policy), |automaton| json!(automaton.matching)),
         "seed": arguments.evaluation.seed,
@@ -316,18 +317,18 @@ fn report(
 
 fn shown(
     arguments: &Arguments,
-    model: &Model,
+    scenario: &Scenario,
     solver: SolverKind,
     solution: &Solution,
     earned: &Earned,
     (solve, evaluate): (f64, f64),
 ) -> String {
     let nodes = solution.automaton().map(|automaton| automaton.nodes.len());
-    let mut lines = vec![summary::heading(&model.name, solver.name(), nodes)];
+    let mut lines = vec![summary::heading(&scenario.model.name, solver.name(), nodes)];
     lines.extend(solution.automaton().map(summary::nodes));
     lines.push(String::new());
     lines.push(summary::evaluation(earned, solution.planned_value));
-    if model.world.walls == Walls::Clamp && model.belief.walls == WallBelief::Ignore {
+    if scenario.truth.walls == Walls::Clamp && scenario.model.belief.walls == WallBelief::Ignore {
         lines.push("  the filter does not know of the walls, so the plan expects another return than is earned".to_owned());
     }
     if let Some(horizon) = solution.policy_convergence_horizon {

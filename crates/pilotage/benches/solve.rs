@@ -3,9 +3,9 @@
 
 use divan::{Bencher, counter::ItemsCount};
 use pilotage::belief::BeliefMdp;
-use pilotage::model::{self, Model};
 use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller, Policy};
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::kbvi::closed;
@@ -20,24 +20,24 @@ const EPISODES: usize = 10_000;
 #[divan::bench(sample_count = 10)]
 fn whole() -> Evaluation {
     let corridor = read();
-    let policy = plan(&BeliefMdp::new(&corridor));
+    let policy = plan(&BeliefMdp::new(&corridor.model));
     simulate(&corridor, &Controller::new(&compiled(&policy)))
 }
 
 #[divan::bench]
-fn read() -> Model {
-    model::find("corridor").unwrap()
+fn read() -> Scenario {
+    scenario::find("corridor").unwrap()
 }
 
 #[divan::bench(sample_count = 10)]
 fn plan_only(bencher: Bencher) {
-    let mdp = BeliefMdp::new(&read());
+    let mdp = BeliefMdp::new(&read().model);
     bencher.bench(|| plan(&mdp));
 }
 
 #[divan::bench(sample_count = 10)]
 fn compile_only(bencher: Bencher) {
-    let policy = plan(&BeliefMdp::new(&read()));
+    let policy = plan(&BeliefMdp::new(&read().model));
     bencher.bench(|| compiled(&policy));
 }
 
@@ -45,7 +45,7 @@ fn compile_only(bencher: Bencher) {
 #[divan::bench(sample_count = 10)]
 fn episodes_of_the_automaton(bencher: Bencher) {
     let corridor = read();
-    let policy = plan(&BeliefMdp::new(&corridor));
+    let policy = plan(&BeliefMdp::new(&corridor.model));
     let controller = Controller::new(&compiled(&policy));
     bencher
         .counter(ItemsCount::new(EPISODES))
@@ -55,7 +55,7 @@ fn episodes_of_the_automaton(bencher: Bencher) {
 #[divan::bench(sample_count = 10)]
 fn episodes_of_the_grid(bencher: Bencher) {
     let corridor = read();
-    let policy = plan(&BeliefMdp::new(&corridor));
+    let policy = plan(&BeliefMdp::new(&corridor.model));
     bencher
         .counter(ItemsCount::new(EPISODES))
         .bench(|| simulate(&corridor, &policy));
@@ -70,11 +70,11 @@ fn compiled(policy: &closed::GridPolicy) -> Automaton {
     compile(policy, policy.mdp(), "kbvi-closed", &settings).unwrap()
 }
 
-fn simulate(model: &Model, policy: &dyn Policy) -> Evaluation {
-    let filter = BeliefMdp::new(model).filter();
+fn simulate(scenario: &Scenario, policy: &dyn Policy) -> Evaluation {
+    let filter = BeliefMdp::new(&scenario.model).filter();
     let options = Options {
         episodes: EPISODES,
         seed: 1,
     };
-    evaluate(model, &filter, policy, options, &Silent)
+    evaluate(scenario, &filter, policy, options, &Silent)
 }

@@ -5,9 +5,9 @@
 use divan::{Bencher, black_box};
 use nalgebra::{DMatrix, DVector};
 use pilotage::belief::BeliefMdp;
-use pilotage::model;
 use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller, Matching, Node, Place};
+use pilotage::scenario;
 use pilotage::simulate::{Agent, FilterAgent};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::kbvi::closed;
@@ -68,12 +68,12 @@ fn four_dimensions_few_nodes(bencher: Bencher, nodes: usize) {
 }
 
 fn corridor() -> closed::GridPolicy {
-    let mdp = BeliefMdp::new(&model::find("corridor").unwrap());
+    let mdp = BeliefMdp::new(&scenario::find("corridor").unwrap().model);
     closed::solve(&mdp, &closed::Settings::default(), &Silent).unwrap()
 }
 
 fn synthetic(nodes: usize, matching: Matching) -> Automaton {
-    let mdp = BeliefMdp::new(&model::find("cart-pole").unwrap());
+    let mdp = BeliefMdp::new(&scenario::find("cart-pole").unwrap().model);
     let mut automaton = Automaton::new(&mdp, "bench", matching);
     for k in 0..nodes {
         let corner = |width: f64| -> Vec<f64> {

@@ -11,9 +11,9 @@
 
 use std::time::Instant;
 
-use pilotage::model::{self, Model};
 use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller};
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options, evaluate};
 use pilotage::solve::kbvi::closed;
 use pilotage::solve::{Form, SolveSettings, SolverKind, arkaq, kafaq, solve, yardstick};
@@ -54,7 +54,7 @@ fn main() {
         .into_iter()
         .filter(|name| which == "all" || which == *name)
     {
-        let table = Table::new(&model::find(name).unwrap(), seeds);
+        let table = Table::new(&scenario::find(name).unwrap(), seeds);
         let file = format!("{folder}/learning-{name}.json");
         std::fs::write(file, serde_json::to_string(&table.json()).unwrap()).unwrap();
     }
@@ -94,10 +94,10 @@ struct Table {
 }
 
 impl Table {
-    fn new(model: &Model, seeds: u64) -> Self {
+    fn new(scenario: &Scenario, seeds: u64) -> Self {
         let mut table = Self {
-            problem: model.name.clone(),
-            yardstick: yardstick(model),
+            problem: scenario.model.name.clone(),
+            yardstick: yardstick(scenario),
             rows: Vec::new(),
         };
         println!(
@@ -111,10 +111,11 @@ impl Table {
             table.yardstick.1.discounted.mean,
             table.yardstick.1.discounted.stderr,
         );
-        let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+        let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(scenario)) };
         let all = || (1..=seeds).into_par_iter();
-        let learned: Result<Vec<Run>, _> =
-            all().map(|seed| run_kafaq(model, &worlds, seed)).collect();
+        let learned: Result<Vec<Run>, _> = all()
+            .map(|seed| run_kafaq(scenario, &worlds, seed))
+            .collect();
         match learned {
             Ok(runs) => {
                 table.add("KAFAQ".to_owned(), runs);
@@ -122,7 +123,7 @@ impl Table {
             Err(error) => println!("| {} | KAFAQ | {error} |", table.problem),
         }
         let mut add = |learner: &str, settings: &arkaq::Settings| {
-            let runs = all().map(|seed| run_arkaq(model, &worlds, settings, seed));
+            let runs = all().map(|seed| run_arkaq(scenario, &worlds, settings, seed));
             table.add(format!("ARKAQ, {learner}"), runs.collect())
         };
         let extended = arkaq::Settings::extended();
@@ -261,17 +262,17 @@ impl Run {
     }
 }
 
-fn run_kafaq(model: &Model, worlds: &kafaq::Worlds<'_>, seed: u64) -> pilotage::Result<Run> {
+fn run_kafaq(scenario: &Scenario, worlds: &kafaq::Worlds<'_>, seed: u64) -> pilotage::Result<Run> {
     let clock = Instant::now();
     let settings = kafaq::Settings {
         seed,
         ..kafaq::Settings::default()
     };
-    let learned = kafaq::learn(model, worlds, &settings, None, &Silent)?;
+    let learned = kafaq::learn(&scenario.model, worlds, &settings, None, &Silent)?;
     Ok(Run {
         seed,
         seconds: clock.elapsed().as_secs_f64(),
-        earned: earned(model, &learned.automaton),
+        earned: earned(scenario, &learned.automaton),
         automaton: learned.automaton,
         samples: learned.samples,
         converged: learned.converged,
@@ -280,7 +281,7 @@ fn run_kafaq(model: &Model, worlds: &kafaq::Worlds<'_>, seed: u64) -> pilotage::
 }
 
 fn run_arkaq(
-    model: &Model,
+    scenario: &Scenario,
     worlds: &arkaq::Worlds<'_>,
     settings: &arkaq::Settings,
     seed: u64,
@@ -290,7 +291,7 @@ fn run_arkaq(
         seed,
         ..settings.clone()
     };
-    let learned = arkaq::learn(model, worlds, &settings, None, &Silent).unwrap();
+    let learned = arkaq::learn(&scenario.model, worlds, &settings, None, &Silent).unwrap();
     let rewarded = || {
         learned
             .learning
@@ -302,7 +303,7 @@ fn run_arkaq(
     Run {
         seed,
         seconds: clock.elapsed().as_secs_f64(),
-        earned: earned(model, &learned.automaton),
+        earned: earned(scenario, &learned.automaton),
         samples: learned.samples,
         converged: learned.converged,
         network: Some(Network {
@@ -316,14 +317,21 @@ fn run_arkaq(
     }
 }
 
-fn earned(model: &Model, automaton: &Automaton) -> Evaluation {
+fn earned(scenario: &Scenario, automaton: &Automaton) -> Evaluation {
     let controller = Controller::new(automaton);
-    evaluate(model, &automaton.filter, &controller, EVALUATION, &Silent)
+    evaluate(
+        scenario,
+        &automaton.filter,
+        &controller,
+        EVALUATION,
+        &Silent,
+    )
 }
 
 /// The one who is told, and the nodes of the planner's automaton. For the pole, which no grid plans, it is the return of one who
 /// never leaves the equilibrium and is paid 1 for every step.
-fn yardstick(model: &Model) -> (String, Evaluation, Option<usize>) {
+fn yardstick(scenario: &Scenario) -> (String, Evaluation, Option<usize>) {
+    let model = &scenario.model;
     if model.state.len() > 2 {
         let steps = model.episode.length;
         let estimate = |mean: f64| Estimate { mean, stderr: 0.0 };
@@ -341,11 +349,11 @@ fn yardstick(model: &Model) -> (String, Evaluation, Option<usize>) {
         form: Form::Segments,
         ..SolveSettings::default()
     };
-    let told = yardstick::told(model);
+    let told = yardstick::told(scenario);
     let plan = solve(SolverKind::KbviClosed, &told, &settings, &Silent).unwrap();
     let nodes = plan.automaton().map(|automaton| automaton.nodes.len());
     let planner = closed::Settings::default();
-    let first = yardstick::yardsticks(model, &planner, EVALUATION, &Silent)
+    let first = yardstick::yardsticks(scenario, &planner, EVALUATION, &Silent)
         .unwrap()
         .swap_remove(0);
     (first.who.to_owned(), first.earned, nodes)

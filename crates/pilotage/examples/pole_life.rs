@@ -12,9 +12,9 @@
 use std::time::Instant;
 
 use pilotage::belief::BeliefMdp;
-use pilotage::model::find;
 use pilotage::observe::{Observer, Silent};
 use pilotage::policy::{Controller, Policy};
+use pilotage::scenario::find;
 use pilotage::simulate::{LifeOptions, life};
 use pilotage::solve::kbvi::branches::{self, Branches};
 use pilotage::solve::kbvi::quadratic;
@@ -37,8 +37,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         steps: number(2, 1_500_000)?,
         seed: number(3, 2026)?,
     };
-    let model = find(name)?;
-    let mdp = BeliefMdp::new(&model);
+    let scenario = find(name)?;
+    let mdp = BeliefMdp::new(&scenario.model);
 
     let clock = Instant::now();
     let automaton = quadratic::solve(&mdp, &quadratic::Settings::default(), &Notes)?;
@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     println!("|---|---|---|---|---|---|---|");
     let row = |label: &str, nodes: String, policy: &dyn Policy, options: LifeOptions| {
-        let life = life(&model, &automaton.filter, policy, options, &Silent);
+        let life = life(&scenario, &automaton.filter, policy, options, &Silent);
         let mean = life
             .mean()
             .map_or(format!("at least {:.0} (95%)", life.at_least()), |mean| {

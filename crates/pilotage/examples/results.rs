@@ -1,8 +1,8 @@
 //! Every planner on the problems of one and two dimensions, as Markdown tables: `cargo run --release --example results > docs/results.md`.
 #![allow(clippy::print_stdout)]
 
-use pilotage::model::{self, Model};
 use pilotage::observe::Silent;
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options};
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};
 use pilotage::solve::{Form, SolveSettings, SolverKind, solve};
@@ -29,8 +29,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     let mut earned = Vec::new();
     for name in PROBLEMS {
-        let model = model::find(name)?;
-        println!("\n## {name}\n\n{}\n", model.about);
+        let scenario = scenario::find(name)?;
+        println!("\n## {name}\n\n{}\n", scenario.model.about);
         println!(
             "| solver | formulas | policy | nodes | horizon | planned | discounted | undiscounted | steps |"
         );
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         {
             for (label, formulas) in formula_sets(solver) {
                 for form in Form::ALL {
-                    let Some(evaluation) = row(&model, solver, label, formulas, form)? else {
+                    let Some(evaluation) = row(&scenario, solver, label, formulas, form)? else {
                         continue;
                     };
                     earned.push(((name, solver, label, form), evaluation));
@@ -156,14 +156,14 @@ fn formula_sets(solver: SolverKind) -> Vec<(&'static str, Formulas)> {
 }
 
 fn row(
-    model: &Model,
+    scenario: &Scenario,
     solver: SolverKind,
     label: &str,
     formulas: Formulas,
     form: Form,
 ) -> Result<Option<Evaluation>, Box<dyn std::error::Error>> {
     let slow = solver == SolverKind::Kbvi && form == Form::Grid;
-    if slow || solver.accepts(model).is_err() {
+    if slow || solver.accepts(&scenario.model).is_err() {
         return Ok(None);
     }
     let settings = SolveSettings {
@@ -172,13 +172,13 @@ fn row(
         formulas,
         ..SolveSettings::default()
     };
-    let solution = solve(solver, model, &settings, &Silent)?;
+    let solution = solve(solver, scenario, &settings, &Silent)?;
     let episodes = if form == Form::Grid { 2_000 } else { EPISODES };
     let options = Options {
         episodes,
         seed: SEED,
     };
-    let earned = solution.evaluate(model, options, &Silent);
+    let earned = solution.evaluate(scenario, options, &Silent)?;
     let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
     println!(
         "| {} | {label} | {} | {} | {} | {} | {} | {} | {:.2} |",

@@ -14,18 +14,18 @@
 //! [`model`], [`belief`], [`solve`], [`policy`], [`simulate`], `report`; what is true is a [`world`], into which no agent looks.
 //!
 //! ```
-//! use pilotage::{model, observe::Silent, simulate::Options};
+//! use pilotage::{observe::Silent, scenario, simulate::Options};
 //! use pilotage::solve::{SolveSettings, SolverKind, solve};
 //!
 //! // A robot in a corridor of four cells, paid in the last one.
-//! let corridor = model::find("corridor-unbounded")?;
+//! let corridor = scenario::find("corridor-unbounded")?;
 //! let solution = solve(SolverKind::KbviClosed, &corridor, &SolveSettings::default(), &Silent)?;
 //!
 //! // Go EAST below 3, STOP up to 4, WEST above.
 //! let automaton = solution.automaton().expect("the default form is an automaton");
 //! assert_eq!(automaton.nodes.len(), 3);
 //!
-//! let earned = solution.evaluate(&corridor, Options { episodes: 2000, seed: 1 }, &Silent).discounted;
+//! let earned = solution.evaluate(&corridor, Options { episodes: 2000, seed: 1 }, &Silent)?.discounted;
 //! assert!((earned.mean - 0.82928).abs() < 4.0 * earned.stderr);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -40,6 +40,7 @@ pub mod policy;
 pub mod random;
 #[cfg(feature = "report")]
 pub mod report;
+pub mod scenario;
 pub mod simulate;
 pub mod solve;
 pub mod world;

@@ -3,36 +3,37 @@
 
 use nalgebra::DVector;
 use pilotage::belief::{Belief, BeliefMdp, Filter, Switch};
-use pilotage::model::{self, Interval, Model, Region, StartShape, Then, When};
+use pilotage::model::{Interval, Region, StartShape, Then, When};
+use pilotage::scenario::{self, Scenario, Truth};
 use pilotage::world::{Draws, ProblemWorld, World};
 
-fn model(name: &str) -> Model {
-    model::find(name).unwrap_or_else(|error| panic!("{error}"))
+fn scenario(name: &str) -> Scenario {
+    scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The model without any noise, starting at a point.
-fn still(name: &str, at: &[f64], mode: usize) -> Model {
-    let mut model = model(name);
+/// The scenario without any noise, starting at a point.
+fn still(name: &str, at: &[f64], mode: usize) -> Scenario {
+    let Scenario {
+        mut model,
+        mut truth,
+    } = scenario(name);
     model.motion.noise *= 0.0;
     model.sensor.noise *= 0.0;
-    if let Some(noise) = &mut model.world.motion.noise {
+    if let Some(noise) = &mut truth.motion.noise {
         *noise *= 0.0;
     }
-    let mut start = model
-        .world
-        .start
-        .take()
-        .unwrap_or_else(|| model.start.clone());
+    let mut start = truth.start.take().unwrap_or_else(|| model.start.clone());
     start[0].mean = DVector::from_column_slice(at);
     start[0].covariance *= 0.0;
     start[0].mode = mode;
-    model.world.start = Some(start);
-    model
+    truth.start = Some(start);
+    Scenario { model, truth }
 }
 
 /// Reward, state and mode afterwards of a plan's steps.
-fn walk(model: &Model, plan: &[&str]) -> Vec<(f64, Vec<f64>, usize)> {
-    let mut world = ProblemWorld::new(model);
+fn walk(scenario: &Scenario, plan: &[&str]) -> Vec<(f64, Vec<f64>, usize)> {
+    let model = &scenario.model;
+    let mut world = ProblemWorld::new(scenario);
     let mut draws = Draws::new(1, 0);
     world.reset(&mut draws);
     let mut sensed = vec![0.0; model.observation_dim()];
@@ -65,8 +66,8 @@ fn the_hallway_pays_for_arriving_and_for_the_right_direction() {
 
 #[test]
 fn a_load_is_taken_on_arrival() {
-    let model = still("cart-load-unload", &[1.5], 0);
-    let steps = walk(&model, &["WEST", "EAST", "EAST", "EAST", "WEST", "EAST"]);
+    let scenario = still("cart-load-unload", &[1.5], 0);
+    let steps = walk(&scenario, &["WEST", "EAST", "EAST", "EAST", "WEST", "EAST"]);
     assert_eq!(rewards(&steps), [20.0, 0.0, 0.0, 20.0, 0.0, 0.0]);
     assert_eq!(
         steps.iter().map(|step| step.2).collect::<Vec<_>>(),
@@ -76,18 +77,18 @@ fn a_load_is_taken_on_arrival() {
 
 #[test]
 fn the_maze_pays_at_its_corner_and_for_no_wall() {
-    let model = still("maze-4x4", &[2.5, 1.5], 0);
+    let scenario = still("maze-4x4", &[2.5, 1.5], 0);
     assert_eq!(
-        rewards(&walk(&model, &["SOUTH", "EAST", "EAST", "NORTH"])),
+        rewards(&walk(&scenario, &["SOUTH", "EAST", "EAST", "NORTH"])),
         [0.0, 10.0, 9.0, 0.0]
     );
 }
 
 #[test]
 fn stations_match() {
-    let model = still("stations-5x5", &[1.5, 3.5], 0);
+    let scenario = still("stations-5x5", &[1.5, 3.5], 0);
     let steps = walk(
-        &model,
+        &scenario,
         &["WEST", "NORTH", "SOUTH", "SOUTH", "SOUTH", "SOUTH", "EAST"],
     );
     // WEST: toward L1; NORTH: toward it and into it; then down to U1; then EAST, toward L2 from the wrong half.
@@ -107,11 +108,11 @@ fn stations_match() {
 
 #[test]
 fn the_shuttle_moves_the_way_it_faces_and_docks_backwards() {
-    let model = still("shuttle", &[0.5], 0);
+    let scenario = still("shuttle", &[0.5], 0);
     let plan = [
         "MOVE", "MOVE", "TURN", "TURN", "TURN", "MOVE", "MOVE", "MOVE", "TURN",
     ];
-    let steps = walk(&model, &plan);
+    let steps = walk(&scenario, &plan);
     let places: Vec<f64> = steps.iter().map(|step| step.1[0]).collect();
     assert_eq!(places, [1.5, 2.5, 2.5, 2.5, 2.5, 1.5, 0.5, 0.0, 0.0]);
     // The first turn attaches; the next two do not, as this dock was visited last; a MOVE into a station costs 10.
@@ -120,19 +121,19 @@ fn the_shuttle_moves_the_way_it_faces_and_docks_backwards() {
         [0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 0.0, -10.0, 10.0]
     );
     // The agent's own model has no idea of it.
-    assert_eq!(model.displacement(0)[0], 0.0);
+    assert_eq!(scenario.model.displacement(0)[0], 0.0);
 }
 
 #[test]
 fn a_uniform_start_fills_its_box_and_is_believed_by_its_moments() {
-    let model = model("stations-5x5");
-    let start = &model.start[0];
+    let scenario = scenario("stations-5x5");
+    let start = &scenario.model.start[0];
     assert_eq!(start.shape, StartShape::Uniform);
     assert_eq!(start.mean.as_slice(), [2.5, 2.5]);
     assert!(
         (start.covariance[(0, 0)] - 25.0 / 12.0).abs() < 1e-12 && start.covariance[(0, 1)] == 0.0
     );
-    let mut world = ProblemWorld::new(&model);
+    let mut world = ProblemWorld::new(&scenario);
     let count = 4_000;
     let (mut sum, mut fourth) = ([0.0; 2], 0.0);
     for episode in 0..count {
@@ -154,18 +155,23 @@ fn a_uniform_start_fills_its_box_and_is_believed_by_its_moments() {
 /// The planner's expected reward and chances are what the world does, on average over the belief, where no wall is near.
 #[test]
 fn expected_rewards_after_the_move_are_averages_of_the_world() {
-    let mut model = model("cart-load-unload");
+    let Scenario { mut model, truth } = scenario("cart-load-unload");
     model.state[0].bounds = Interval::new(-50.0, 50.0);
     let mdp = BeliefMdp::new(&model);
     let level = mdp.levels().steady(mdp.start().level, 0).unwrap();
     for (mean, mode, action) in [(1.4, 0, 1), (2.3, 1, 0), (0.4, 0, 0)] {
-        let mut there = model.clone();
         let mut start = model.start.clone();
         start[0].shape = StartShape::Normal;
         start[0].mode = mode;
         start[0].mean[0] = mean;
         start[0].covariance = mdp.levels().covariance(level).clone();
-        there.world.start = Some(start);
+        let there = Scenario {
+            model: model.clone(),
+            truth: Truth {
+                start: Some(start),
+                ..truth.clone()
+            },
+        };
         let mut world = ProblemWorld::new(&there);
         let (mut paid, mut switched) = (0.0, 0.0);
         let count = 4_000;
@@ -198,7 +204,7 @@ fn expected_rewards_after_the_move_are_averages_of_the_world() {
 
 #[test]
 fn a_filter_switches_by_the_mean_before_or_after() {
-    let model = model("cart-load-unload");
+    let model = scenario("cart-load-unload").model;
     let mdp = BeliefMdp::new(&model);
     let switch = |when| Switch {
         actions: Some(vec![1]),
@@ -231,7 +237,7 @@ fn a_filter_switches_by_the_mean_before_or_after() {
 /// A belief that knows of walls does not expect to have walked through one.
 #[test]
 fn predictions_stop_at_walls() {
-    let model = model("basic");
+    let model = scenario("basic").model;
     let mdp = BeliefMdp::new(&model);
     let filter = mdp.filter();
     let level = mdp.levels().steady(mdp.start().level, 0).unwrap();

@@ -1,11 +1,11 @@
 //! No text makes the reader panic, and every error points into its text.
 #![allow(clippy::unwrap_used)]
 
-use pilotage::model;
+use pilotage::scenario;
 use proptest::prelude::*;
 
 fn read_without_panic(text: &str) {
-    if let Err(error) = model::read(text, "any.toml") {
+    if let Err(error) = scenario::read(text, "any.toml") {
         let place = error.place.clone().unwrap();
         assert!(
             text.get(place.span.clone()).is_some(),
@@ -28,7 +28,7 @@ fn deep_nesting() {
 }
 
 fn built_in() -> impl Strategy<Value = &'static str> {
-    let texts: Vec<&str> = model::names().filter_map(model::builtin).collect();
+    let texts: Vec<&str> = scenario::names().filter_map(scenario::builtin).collect();
     proptest::sample::select(texts)
 }
 
@@ -124,7 +124,7 @@ proptest! {
 
     #[test]
     fn good_files_with_other_drawings(drawing in "[-+| #.a*]{0,9}(\n[-+| #.a*]{0,9}){0,6}") {
-        let text = model::builtin("maze-2d").unwrap();
+        let text = scenario::builtin("maze-2d").unwrap();
         read_without_panic(&text.replace("....\n....\n....\n...*\n", &drawing));
     }
 

@@ -5,9 +5,10 @@ use std::sync::Mutex;
 
 use pilotage::Error;
 use pilotage::belief::BeliefMdp;
-use pilotage::model::{self, Interval, Model};
+use pilotage::model::{Interval, Model};
 use pilotage::observe::{Observer, Silent};
 use pilotage::policy::{Automaton, Controller, Node, Place};
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::arkaq::{self, Learned, Run, Settings};
 use pilotage::solve::kbvi::closed;
@@ -19,12 +20,12 @@ const OPTIONS: Options = Options {
     seed: 77,
 };
 
-fn model(name: &str) -> Model {
-    model::find(name).unwrap_or_else(|error| panic!("{error}"))
+fn scenario(name: &str) -> Scenario {
+    scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn learn_in(
-    world: &Model,
+    world: &Scenario,
     told: &Model,
     settings: &Settings,
     observer: &dyn Observer,
@@ -33,8 +34,8 @@ fn learn_in(
     arkaq::learn(told, &worlds, settings, None, observer)
 }
 
-fn learn(model: &Model, settings: &Settings) -> Learned {
-    learn_in(model, model, settings, &Silent).unwrap()
+fn learn(scenario: &Scenario, settings: &Settings) -> Learned {
+    learn_in(scenario, &scenario.model, settings, &Silent).unwrap()
 }
 
 fn at(vigilance: f64) -> Settings {
@@ -59,24 +60,24 @@ fn hurried() -> Settings {
     }
 }
 
-fn earned(model: &Model, automaton: &Automaton) -> Evaluation {
+fn earned(scenario: &Scenario, automaton: &Automaton) -> Evaluation {
     let controller = Controller::new(automaton);
-    evaluate(model, &automaton.filter, &controller, OPTIONS, &Silent)
+    evaluate(scenario, &automaton.filter, &controller, OPTIONS, &Silent)
 }
 
-fn planned(model: &Model) -> Evaluation {
-    let mdp = BeliefMdp::new(model);
+fn planned(scenario: &Scenario) -> Evaluation {
+    let mdp = BeliefMdp::new(&scenario.model);
     let plan = closed::solve(&mdp, &closed::Settings::default(), &Silent).unwrap();
-    evaluate(model, &plan.mdp().filter(), &plan, OPTIONS, &Silent)
+    evaluate(scenario, &plan.mdp().filter(), &plan, OPTIONS, &Silent)
 }
 
 #[test]
 fn the_hallway_has_few_clusters_at_low_vigilance_and_more_at_high_and_the_goal_is_apart() {
-    let model = model("basic");
-    let best = planned(&model).discounted.mean;
+    let scenario = scenario("basic");
+    let best = planned(&scenario).discounted.mean;
     let mut clusters = 0;
     for (vigilance, most) in [(0.1, 3), (0.5, 6), (0.9, 30)] {
-        let learned = learn(&model, &at(vigilance));
+        let learned = learn(&scenario, &at(vigilance));
         let found = learned.learning.clusters.len();
         assert!(
             clusters < found && found <= most,
@@ -102,17 +103,17 @@ fn the_hallway_has_few_clusters_at_low_vigilance_and_more_at_high_and_the_goal_i
             places.iter().sum::<f64>() / places.len() as f64
         };
         assert!(middle(1.0) > 2.4 && middle(0.0) < 2.4);
-        let earned = earned(&model, &learned.automaton).discounted.mean;
+        let earned = earned(&scenario, &learned.automaton).discounted.mean;
         assert!(earned >= 0.97 * best, "{earned} of {best} at {vigilance}");
     }
 }
 
 #[test]
 fn a_hidden_load_becomes_states_in_the_same_cluster_with_opposite_actions() {
-    let model = model("cart-load-unload");
-    let learned = learn(&model, &at(0.7));
-    let best = planned(&model).discounted.mean;
-    let earned = earned(&model, &learned.automaton).discounted.mean;
+    let scenario = scenario("cart-load-unload");
+    let learned = learn(&scenario, &at(0.7));
+    let best = planned(&scenario).discounted.mean;
+    let earned = earned(&scenario, &learned.automaton).discounted.mean;
     assert!(earned >= 0.85 * best, "{earned} of {best}");
     // In the middle, a node that goes east and one that goes west.
     let inside =
@@ -129,7 +130,7 @@ fn a_hidden_load_becomes_states_in_the_same_cluster_with_opposite_actions() {
         depth: 0,
         ..at(0.7)
     };
-    let without = self::earned(&model, &learn(&model, &forgetful).automaton)
+    let without = self::earned(&scenario, &learn(&scenario, &forgetful).automaton)
         .discounted
         .mean;
     assert!(without < 0.7 * best, "{without} of {best}");
@@ -137,15 +138,15 @@ fn a_hidden_load_becomes_states_in_the_same_cluster_with_opposite_actions() {
 
 #[test]
 fn merging_leaves_fewer_nodes_and_loses_nothing() {
-    let model = model("cart-load-unload");
+    let scenario = scenario("cart-load-unload");
     let merging = Settings {
         merge: true,
         ..at(0.7)
     };
-    let (learned, merged) = (learn(&model, &at(0.7)), learn(&model, &merging));
+    let (learned, merged) = (learn(&scenario, &at(0.7)), learn(&scenario, &merging));
     assert_eq!(learned.learning.clusters, merged.learning.clusters);
     assert!(4 * merged.automaton.nodes.len() <= learned.automaton.nodes.len());
-    let [before, after] = [&learned, &merged].map(|l| earned(&model, &l.automaton).discounted);
+    let [before, after] = [&learned, &merged].map(|l| earned(&scenario, &l.automaton).discounted);
     // Merging may cost a hundredth in its own trials; the rest is what 500 episodes leave open.
     let open = 4.0 * (before.stderr + after.stderr);
     assert!(
@@ -162,14 +163,14 @@ fn too_many_states_end_exploration_with_a_clear_statement() {
             self.0.lock().unwrap().push(message.to_owned());
         }
     }
-    let model = model("cart-pole-sd");
+    let scenario = scenario("cart-pole-sd");
     let settings = Settings {
         state_limit: 40,
         epoch_limit: 2,
         ..at(0.9)
     };
     let notes = Notes(Mutex::default());
-    let learned = learn_in(&model, &model, &settings, &notes).unwrap();
+    let learned = learn_in(&scenario, &scenario.model, &settings, &notes).unwrap();
     assert!(learned.learning.capped && !learned.converged);
     assert_eq!(learned.automaton.nodes.len(), 40);
     let notes = notes.0.into_inner().unwrap();
@@ -181,13 +182,13 @@ fn too_many_states_end_exploration_with_a_clear_statement() {
 
 #[test]
 fn vigilance_that_tunes_itself_stops_at_the_limit_and_keeps_the_best() {
-    let model = model("cart-load-unload");
+    let scenario = scenario("cart-load-unload");
     let settings = Settings {
         vigilances: vec![0.1, 0.5, 0.9, 0.95],
         state_limit: 60,
         ..Settings::default()
     };
-    let learned = learn(&model, &settings);
+    let learned = learn(&scenario, &settings);
     // At 0.1 loaded and empty are told apart poorly; 0.9 needs too many, so that 0.95 is not tried.
     assert!(learned.learning.vigilance > 0.1);
     assert!(
@@ -209,7 +210,7 @@ fn vigilance_that_tunes_itself_stops_at_the_limit_and_keeps_the_best() {
 /// Two docks, and which way the shuttle faces is to be told from the last three steps.
 #[test]
 fn a_longer_memory_finds_which_way_the_shuttle_faces_and_merges_into_a_handful_of_states() {
-    let model = model("shuttle");
+    let scenario = scenario("shuttle");
     let short = Settings {
         lambda: 0.9,
         ..at(0.5)
@@ -225,11 +226,11 @@ fn a_longer_memory_finds_which_way_the_shuttle_faces_and_merges_into_a_handful_o
         episodes: 2_000,
         ..OPTIONS
     };
-    let best = yardsticks(&model, &told, options, &Silent).unwrap()[0].earned;
+    let best = yardsticks(&scenario, &told, options, &Silent).unwrap()[0].earned;
     let share = |learned: &Learned| {
-        earned(&model, &learned.automaton).discounted.mean / best.discounted.mean
+        earned(&scenario, &learned.automaton).discounted.mean / best.discounted.mean
     };
-    let (short, long) = (learn(&model, &short), learn(&model, &long));
+    let (short, long) = (learn(&scenario, &short), learn(&scenario, &long));
     let (one, three) = (share(&short), share(&long));
     assert!(three >= 0.85 && three > 1.5 * one, "{one} and {three}");
     let nodes = long.automaton.nodes.len();
@@ -238,12 +239,15 @@ fn a_longer_memory_finds_which_way_the_shuttle_faces_and_merges_into_a_handful_o
 
 #[test]
 fn an_automaton_runs_from_its_file_as_it_was_learned() {
-    let model = model("cart-load-unload");
-    let learned = learn(&model, &hurried());
+    let scenario = scenario("cart-load-unload");
+    let learned = learn(&scenario, &hurried());
     let text = learned.automaton.to_json().unwrap();
     let read = Automaton::from_json(&text, "test").unwrap();
     assert_eq!(read, learned.automaton);
-    assert_eq!(earned(&model, &read), earned(&model, &learned.automaton));
+    assert_eq!(
+        earned(&scenario, &read),
+        earned(&scenario, &learned.automaton)
+    );
     // A mode that there is none of makes a damaged file.
     let mut damaged: serde_json::Value = serde_json::from_str(&text).unwrap();
     let next = damaged
@@ -256,27 +260,30 @@ fn an_automaton_runs_from_its_file_as_it_was_learned() {
 
 #[test]
 fn a_run_is_its_seed_and_a_resumed_one_ends_like_one_never_stopped() {
-    let model = model("cart-load-unload");
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&model)) };
-    let whole = learn(&model, &hurried());
-    assert_eq!(whole, learn(&model, &hurried()));
+    let scenario = scenario("cart-load-unload");
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&scenario)) };
+    let whole = learn(&scenario, &hurried());
+    assert_eq!(whole, learn(&scenario, &hurried()));
     let other = Settings {
         seed: 2,
         ..hurried()
     };
-    assert_ne!(whole.learning.curve, learn(&model, &other).learning.curve);
+    assert_ne!(
+        whole.learning.curve,
+        learn(&scenario, &other).learning.curve
+    );
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("checkpoint");
-    let mut run = Run::new(&model, &worlds, &hurried()).unwrap();
+    let mut run = Run::new(&scenario.model, &worlds, &hurried()).unwrap();
     while !run.finished() {
         run.advance(&Silent).unwrap();
         run.save(&path).unwrap();
-        run = Run::resume(&model, &worlds, &hurried(), &path).unwrap();
+        run = Run::resume(&scenario.model, &worlds, &hurried(), &path).unwrap();
     }
     assert_eq!(run.learned(), whole);
     // Another's checkpoint is refused.
     assert!(matches!(
-        Run::resume(&model, &worlds, &other, &path).map(|_| ()),
+        Run::resume(&scenario.model, &worlds, &other, &path).map(|_| ()),
         Err(Error::Checkpoint { .. })
     ));
 }
@@ -284,12 +291,12 @@ fn a_run_is_its_seed_and_a_resumed_one_ends_like_one_never_stopped() {
 /// The learner is told neither rewards nor events: a model without them makes no difference.
 #[test]
 fn rewards_and_map_are_learned_and_not_read() {
-    let world = model("cart-load-unload");
-    let mut told = world.clone();
+    let world = scenario("cart-load-unload");
+    let mut told = world.model.clone();
     told.rewards.clear();
     told.events.clear();
     let (all, little) = (
-        learn_in(&world, &world, &hurried(), &Silent).unwrap(),
+        learn_in(&world, &world.model, &hurried(), &Silent).unwrap(),
         learn_in(&world, &told, &hurried(), &Silent).unwrap(),
     );
     assert_eq!(all.learning.curve, little.learning.curve);
@@ -377,9 +384,9 @@ fn settings_out_of_range_are_refused_by_name() {
             },
         ),
     ];
-    let model = model("basic");
+    let scenario = scenario("basic");
     for (name, settings) in bad {
-        let error = learn_in(&model, &model, &settings, &Silent).unwrap_err();
+        let error = learn_in(&scenario, &scenario.model, &settings, &Silent).unwrap_err();
         assert!(
             matches!(error, Error::Setting { setting, .. } if setting == name),
             "{name}: {error}"
@@ -389,8 +396,8 @@ fn settings_out_of_range_are_refused_by_name() {
 
 #[test]
 fn a_world_without_bounds_is_refused() {
-    let mut model = model("basic");
-    model.state[0].bounds = Interval::ALL;
-    let error = learn_in(&model, &model, &hurried(), &Silent).unwrap_err();
+    let mut scenario = scenario("basic");
+    scenario.model.state[0].bounds = Interval::ALL;
+    let error = learn_in(&scenario, &scenario.model, &hurried(), &Silent).unwrap_err();
     assert!(error.to_string().contains("state.bounds"), "{error}");
 }

@@ -1,7 +1,8 @@
 //! Every mistake in a model file has a message with a place and a hint. Each row of the table edits a good file once.
 #![allow(clippy::unwrap_used)]
 
-use pilotage::model::{self, ModelError};
+use pilotage::model::ModelError;
+use pilotage::scenario;
 
 /// One mistake: in the built-in model `base`, `good` is replaced by `bad`. The error is placed at the first occurrence of
 /// `at` in the edited text.
@@ -187,7 +188,9 @@ const MISTAKES: &[Mistake] = &[
 ];
 
 fn error_of(text: &str) -> ModelError {
-    model::read(text, "bad.toml").map(|_| ()).expect_err(text)
+    scenario::read(text, "bad.toml")
+        .map(|_| ())
+        .expect_err(text)
 }
 
 fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
@@ -208,7 +211,7 @@ fn every_mistake_is_shown_at_its_place_with_a_hint() {
         hint,
     } in MISTAKES
     {
-        let text = model::builtin(base).unwrap();
+        let text = scenario::builtin(base).unwrap();
         assert!(text.contains(good), "{base} has no {good:?}");
         let text = text.replacen(good, bad, 1);
         let expected = line_and_column(
@@ -216,7 +219,7 @@ fn every_mistake_is_shown_at_its_place_with_a_hint() {
             text.find(at)
                 .unwrap_or_else(|| panic!("no {at:?} beside {bad:?}")),
         );
-        let error = match model::read(&text, "bad.toml") {
+        let error = match scenario::read(&text, "bad.toml") {
             Ok(_) => {
                 wrong.push(format!("{base}: {bad:?} is accepted"));
                 continue;
@@ -253,7 +256,7 @@ fn an_error_names_its_file() {
 
 #[test]
 fn a_missing_file_is_named() {
-    let error = model::find("no/such/file.toml").map(|_| ()).unwrap_err();
+    let error = scenario::find("no/such/file.toml").map(|_| ()).unwrap_err();
     assert_eq!(error.place, None);
     assert!(
         error
@@ -265,7 +268,7 @@ fn a_missing_file_is_named() {
 
 #[test]
 fn a_misspelt_problem_brings_the_nearest_name() {
-    let error = model::find("coridor").map(|_| ()).unwrap_err();
+    let error = scenario::find("coridor").map(|_| ()).unwrap_err();
     assert_eq!(error.hint, "did you mean `corridor`?");
 }
 
@@ -274,7 +277,7 @@ fn a_file_that_is_not_text_is_refused_at_its_first_wrong_byte() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("image.toml");
     std::fs::write(&path, b"format = 1\nname = \"\xff\xfe\"\n").unwrap();
-    let error = model::load(&path).map(|_| ()).unwrap_err();
+    let error = scenario::load(&path).map(|_| ()).unwrap_err();
     let place = error.place.clone().unwrap();
     assert_eq!((place.line, place.column), (2, 9));
     assert!(error.message.contains("not UTF-8"), "{error}");

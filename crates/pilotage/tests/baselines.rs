@@ -8,27 +8,28 @@ use pilotage::model::{self, Interval, Model, Region};
 use pilotage::observe::Silent;
 use pilotage::policy::Policy;
 use pilotage::random::{Role, normal, stream};
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options};
 use pilotage::solve::lqg::{Controller, NearestAction, Weights};
 use pilotage::solve::lqr::lqr_gain;
 use pilotage::solve::mdp::{self, StateMdp};
 use pilotage::solve::{Form, Solution, SolveSettings, SolverKind, solve};
 
-fn model(name: &str) -> Model {
-    model::find(name).unwrap()
+fn scenario(name: &str) -> Scenario {
+    scenario::find(name).unwrap()
 }
 
-fn solved(kind: SolverKind, model: &Model) -> Solution {
+fn solved(kind: SolverKind, scenario: &Scenario) -> Solution {
     let settings = SolveSettings {
         form: Form::Grid,
         ..Default::default()
     };
-    solve(kind, model, &settings, &Silent).unwrap()
+    solve(kind, scenario, &settings, &Silent).unwrap()
 }
 
-fn earned(solution: &Solution, model: &Model, episodes: usize) -> Evaluation {
+fn earned(solution: &Solution, scenario: &Scenario, episodes: usize) -> Evaluation {
     let options = Options { episodes, seed: 11 };
-    solution.evaluate(model, options, &Silent)
+    solution.evaluate(scenario, options, &Silent).unwrap()
 }
 
 #[track_caller]
@@ -41,15 +42,15 @@ fn assert_near(estimate: Estimate, expected: f64) {
 
 #[test]
 fn the_scalar_problem_costs_what_its_closed_form_says() {
-    let model = model("scalar-lqg");
-    let solution = solved(SolverKind::Lqg, &model);
+    let scenario = scenario("scalar-lqg");
+    let solution = solved(SolverKind::Lqg, &scenario);
     assert!((solution.planned_value.unwrap() + 32.50117).abs() < 5e-6);
-    assert_near(earned(&solution, &model, 20_000).discounted, -32.50117);
+    assert_near(earned(&solution, &scenario, 20_000).discounted, -32.50117);
 }
 
 /// The scalar problem again, in two variables that are turned into each other, discounted, with two controls and one reading.
 fn turning() -> Model {
-    let mut model = model("scalar-lqg");
+    let mut model = scenario("scalar-lqg").model;
     model.discount = 0.9;
     model.state.push(model.state[0].clone());
     model.state[1].name = "y".to_owned();
@@ -74,9 +75,9 @@ fn turning() -> Model {
 
 #[test]
 fn the_closed_form_holds_in_two_variables_with_discount() {
-    let model = turning();
-    let solution = solved(SolverKind::Lqg, &model);
-    let evaluation = earned(&solution, &model, 20_000);
+    let scenario = Scenario::assumed(&turning());
+    let solution = solved(SolverKind::Lqg, &scenario);
+    let evaluation = earned(&solution, &scenario, 20_000);
     assert_near(evaluation.discounted, solution.planned_value.unwrap());
     assert!(evaluation.discounted.stderr < 0.01 * evaluation.discounted.mean.abs());
 }
@@ -93,7 +94,7 @@ fn early_gains_of_a_long_episode_are_the_stationary_one() {
     assert!((controller.gain(0).unwrap() - stationary).amax() < 1e-12);
     assert_eq!(controller.gain(400), None);
     // With A = B = Q = R = 1 it is the golden ratio less 1.
-    let mut scalar = self::model("scalar-lqg");
+    let mut scalar = scenario("scalar-lqg").model;
     scalar.episode.length = 60;
     let controller = Controller::new(&BeliefMdp::new(&scalar)).unwrap();
     assert!((controller.gain(0).unwrap()[0] - (5.0_f64.sqrt() - 1.0) / 2.0).abs() < 1e-12);
@@ -101,7 +102,7 @@ fn early_gains_of_a_long_episode_are_the_stationary_one() {
 
 #[test]
 fn two_nodes_are_the_sign_of_the_command() {
-    let mut model = model("cart-pole");
+    let mut model = scenario("cart-pole").model;
     // Not opposite, so that the plane between the nodes is not through the origin.
     model.actions[1].control[0] = 6.0;
     let mdp = BeliefMdp::new(&model);
@@ -127,7 +128,7 @@ fn two_nodes_are_the_sign_of_the_command() {
 
 #[test]
 fn weights_are_the_settings_then_the_cost_then_brysons() {
-    let mut model = model("cart-pole");
+    let mut model = scenario("cart-pole").model;
     let gain = |model: &Model, weights: &Weights| {
         NearestAction::new(model, weights).unwrap().gain().clone()
     };
@@ -160,19 +161,20 @@ fn weights_are_the_settings_then_the_cost_then_brysons() {
 
 #[test]
 fn bang_bang_holds_the_pole() {
-    let model = model("cart-pole-sd");
-    let solution = solved(SolverKind::Lqg, &model);
-    assert_eq!(earned(&solution, &model, 40).failed, 0.0);
+    let scenario = scenario("cart-pole-sd");
+    let solution = solved(SolverKind::Lqg, &scenario);
+    assert_eq!(earned(&solution, &scenario, 40).failed, 0.0);
 }
 
 #[test]
 fn in_the_corridor_without_walls_both_are_optimal() {
-    let model = model("corridor-unbounded");
-    let mdp = BeliefMdp::new(&model);
+    let scenario = scenario("corridor-unbounded");
+    let model = &scenario.model;
+    let mdp = BeliefMdp::new(model);
     for kind in [SolverKind::Qmdp, SolverKind::Mls] {
-        let solution = solved(kind, &model);
+        let solution = solved(kind, &scenario);
         assert!(solution.converged);
-        assert_near(earned(&solution, &model, 20_000).discounted, 0.82928);
+        assert_near(earned(&solution, &scenario, 20_000).discounted, 0.82928);
         let pilotage::solve::Solved::Rule { policy, .. } = &solution.policy else {
             panic!("compiled");
         };
@@ -202,16 +204,16 @@ fn in_the_corridor_without_walls_both_are_optimal() {
 
 #[test]
 fn where_looking_pays_both_fall_short() {
-    let model = model("corridor-declare");
+    let scenario = scenario("corridor-declare");
     let best = 2.6876;
-    let mls = earned(&solved(SolverKind::Mls, &model), &model, 20_000).discounted;
+    let mls = earned(&solved(SolverKind::Mls, &scenario), &scenario, 20_000).discounted;
     // Replanning that always declares at the most likely goal earns 2.003.
     assert_near(mls, 2.003);
     // Q_MDP expects to know where it is after one more step, so it waits for ever: 0.01 a step, 200 steps.
-    let solution = solved(SolverKind::Qmdp, &model);
+    let solution = solved(SolverKind::Qmdp, &scenario);
     assert!(solution.planned_value.unwrap() > best);
     let waiting = -0.01 * (1.0 - 0.95_f64.powi(200)) / (1.0 - 0.95);
-    let qmdp = earned(&solution, &model, 1000).discounted;
+    let qmdp = earned(&solution, &scenario, 1000).discounted;
     assert!(
         (qmdp.mean - waiting).abs() < 1e-9 && qmdp.stderr < 1e-9,
         "{qmdp:?}"
@@ -220,9 +222,10 @@ fn where_looking_pays_both_fall_short() {
 
 #[test]
 fn at_the_doors_one_listens_and_the_other_does_not() {
-    let model = model("tiger");
-    let mdp = BeliefMdp::new(&model);
-    let qmdp = solved(SolverKind::Qmdp, &model);
+    let scenario = scenario("tiger");
+    let model = &scenario.model;
+    let mdp = BeliefMdp::new(model);
+    let qmdp = solved(SolverKind::Qmdp, &scenario);
     // Listen once, then know: -1 + 0.75 * 10.
     assert!((qmdp.planned_value.unwrap() - 6.5).abs() < 1e-5);
     let pilotage::solve::Solved::Rule { policy, .. } = &qmdp.policy else {
@@ -255,32 +258,32 @@ fn at_the_doors_one_listens_and_the_other_does_not() {
             );
         }
     }
-    let best = earned(&qmdp, &model, 20_000).discounted;
+    let best = earned(&qmdp, &scenario, 20_000).discounted;
     assert!(
         best.mean > 3.9 && best.mean < 4.1065 + 4.0 * best.stderr,
         "{best:?}"
     );
 
-    let mls = solved(SolverKind::Mls, &model);
+    let mls = solved(SolverKind::Mls, &scenario);
     assert!((mls.planned_value.unwrap() - 10.0).abs() < 1e-12);
-    let mls = earned(&mls, &model, 10_000);
+    let mls = earned(&mls, &scenario, 10_000);
     assert_eq!(mls.steps.mean, 1.0);
     assert_near(mls.discounted, -45.0);
 }
 
 #[test]
 fn without_noise_both_know_everything() {
-    let model = model("load-unload");
+    let scenario = scenario("load-unload");
     let g: f64 = 0.75;
     let cycle = (1.0 + g.powi(5)) / (1.0 - g.powi(10));
     for kind in [SolverKind::Qmdp, SolverKind::Mls] {
-        let solution = solved(kind, &model);
+        let solution = solved(kind, &scenario);
         assert!(
             (solution.planned_value.unwrap() - cycle).abs() < 1e-5,
             "{:?}",
             solution.planned_value
         );
-        let evaluation = earned(&solution, &model, 3);
+        let evaluation = earned(&solution, &scenario, 3);
         assert!((evaluation.discounted.mean - cycle).abs() < 1e-5);
         assert_eq!(evaluation.undiscounted.mean, 20.0);
         for form in [Form::Nearest, Form::Segments] {
@@ -290,15 +293,15 @@ fn without_noise_both_know_everything() {
                 runs: Some(10),
                 ..Default::default()
             };
-            let compiled = solve(kind, &model, &settings, &Silent).unwrap();
-            assert_eq!(earned(&compiled, &model, 3).undiscounted.mean, 20.0);
+            let compiled = solve(kind, &scenario, &settings, &Silent).unwrap();
+            assert_eq!(earned(&compiled, &scenario, 3).undiscounted.mean, 20.0);
         }
     }
 }
 
 #[test]
 fn who_leaves_the_living_fails_once() {
-    let mut model = model("corridor-unbounded");
+    let mut model = scenario("corridor-unbounded").model;
     model.actions.truncate(1);
     model.motion.noise = dmatrix![0.0];
     model.rewards[0].region = Region::everywhere();

@@ -2,10 +2,15 @@
 #![allow(clippy::unwrap_used)]
 
 use nalgebra::{DMatrix, DVector};
-use pilotage::model::{self, Interval, Model, Region, Then, Walls, WorldKind};
+use pilotage::model::{Interval, Model, Region, Then};
+use pilotage::scenario::{self, Scenario, Simulator, Walls};
+
+fn scenario(name: &str) -> Scenario {
+    scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
+}
 
 fn model(name: &str) -> Model {
-    model::find(name).unwrap_or_else(|error| panic!("{error}"))
+    scenario(name).model
 }
 
 fn action_names(model: &Model) -> Vec<&str> {
@@ -18,7 +23,7 @@ fn action_names(model: &Model) -> Vec<&str> {
 
 #[test]
 fn every_built_in_model_reads_under_its_own_name() {
-    for name in model::names() {
+    for name in scenario::names() {
         assert_eq!(model(name).name, name);
     }
 }
@@ -38,25 +43,25 @@ fn every_model_file_of_the_workspace_is_built_in() {
         })
         .collect();
     files.sort();
-    let mut names: Vec<&str> = model::names().collect();
+    let mut names: Vec<&str> = scenario::names().collect();
     names.sort();
     assert_eq!(files, names);
 }
 
 #[test]
 fn the_corridor() {
-    let corridor = model("corridor");
+    let Scenario {
+        model: corridor,
+        truth,
+    } = scenario("corridor");
     assert_eq!(action_names(&corridor), ["EAST", "WEST", "STOP"]);
     assert_eq!(corridor.state[0].bounds, Interval::new(0.0, 4.0));
     assert_eq!(
         corridor.rewards[0].region,
         Region::new(vec![(0, Interval::new(3.0, 4.0))])
     );
-    assert_eq!(
-        (corridor.world.walls, corridor.episode.length),
-        (Walls::Clamp, 60)
-    );
-    assert_eq!(model("corridor-unbounded").world.walls, Walls::None);
+    assert_eq!((truth.walls, corridor.episode.length), (Walls::Clamp, 60));
+    assert_eq!(scenario("corridor-unbounded").truth.walls, Walls::None);
 }
 
 /// Reward of an action at a state in the first mode.
@@ -157,7 +162,7 @@ fn the_cart_and_pole_are_held_exactly_over_a_step() {
         ("cart-pole-noisy", 0.45, 0.15),
         ("cart-pole-noisy-sd", 0.45 * 0.45, 0.15 * 0.15),
     ] {
-        let pole = model(name);
+        let Scenario { model: pole, truth } = scenario(name);
         let mut eigenvalues: Vec<f64> = pole
             .motion
             .a
@@ -175,19 +180,22 @@ fn the_cart_and_pole_are_held_exactly_over_a_step() {
             &pole.motion.b * force * pole.motion.b.transpose() + DMatrix::identity(4, 4) * 1e-9;
         assert!((&pole.motion.noise - noise).amax() < 1e-15);
         assert!((&pole.sensor.noise - DMatrix::identity(4, 4) * sensor).amax() < 1e-15);
-        assert!(matches!(pole.world.kind, WorldKind::CartPole(_)));
-        assert_eq!(pole.world.start.unwrap()[0].mean, DVector::zeros(4));
+        assert!(matches!(truth.simulator, Simulator::CartPole(_)));
+        assert_eq!(truth.start.unwrap()[0].mean, DVector::zeros(4));
     }
 }
 
 #[test]
 fn actions_keep_the_order_of_the_file() {
-    let text = model::builtin("corridor").unwrap();
+    let text = scenario::builtin("corridor").unwrap();
     let east = "EAST = { u = [1.0] }\n";
     let last = text
         .replacen(east, "", 1)
         .replacen("STOP =", "ZIGZAG = { u = [0.5] }\nSTOP =", 1);
     let tables = last.replacen("[[reward]]", "[actions.EAST]\nu = [1.0]\n\n[[reward]]", 1);
-    let model = model::read(&tables, "reordered").unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(action_names(&model), ["WEST", "ZIGZAG", "STOP", "EAST"]);
+    let reordered = scenario::read(&tables, "reordered").unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(
+        action_names(&reordered.model),
+        ["WEST", "ZIGZAG", "STOP", "EAST"]
+    );
 }

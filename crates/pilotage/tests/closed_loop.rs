@@ -6,11 +6,12 @@
 
 mod common;
 
-use common::built_in;
+use common::{built_in, scenario};
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::model::{ActionId, Model};
 use pilotage::observe::Silent;
 use pilotage::policy::{Controller, Matching, Policy};
+use pilotage::scenario::Scenario;
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::kbvi::closed::{GridPolicy, Settings, solve};
@@ -25,10 +26,10 @@ fn plan(model: &Model, points: Option<usize>) -> GridPolicy {
     policy
 }
 
-fn evaluated(model: &Model, policy: &dyn Policy, episodes: usize) -> Evaluation {
-    let filter = BeliefMdp::new(model).filter();
+fn evaluated(scenario: &Scenario, policy: &dyn Policy, episodes: usize) -> Evaluation {
+    let filter = BeliefMdp::new(&scenario.model).filter();
     let options = Options { episodes, seed: 7 };
-    evaluate(model, &filter, policy, options, &Silent)
+    evaluate(scenario, &filter, policy, options, &Silent)
 }
 
 fn at(level: usize, mean: f64) -> Belief {
@@ -137,11 +138,11 @@ fn the_value_satisfies_the_bellman_equation() {
 /// Simulated return within three standard errors of the planned one: a correct program fails for 0.3% of seeds.
 #[test]
 fn declaring_is_worth_2_6876() {
-    let model = built_in("corridor-declare");
-    let policy = plan(&model, None);
+    let scenario = scenario("corridor-declare");
+    let policy = plan(&scenario.model, None);
     let planned = policy.start_value();
     assert!((planned - 2.6876).abs() < 0.01, "{planned}");
-    let earned = evaluated(&model, &policy, 100_000).discounted;
+    let earned = evaluated(&scenario, &policy, 100_000).discounted;
     let off = (earned.mean - planned) / earned.stderr;
     assert!(off.abs() < 3.0, "{earned:?}, planned {planned}");
     // The check means something: the standard error is small against the gap to most-likely-state (2.003).
@@ -152,8 +153,8 @@ fn declaring_is_worth_2_6876() {
 /// below the truth: a correct program fails for less than 2% of seeds.
 #[test]
 fn the_tiger_is_worth_4_1065() {
-    let model = built_in("tiger");
-    let policy = plan(&model, None);
+    let scenario = scenario("tiger");
+    let policy = plan(&scenario.model, None);
     let planned = policy.start_value();
     assert!((planned - 4.1065).abs() < 0.005, "{planned}");
     for matching in [Matching::Nearest, Matching::Segments] {
@@ -162,7 +163,7 @@ fn the_tiger_is_worth_4_1065() {
             ..compile::Settings::default()
         };
         let automaton = compile(&policy, policy.mdp(), "kbvi-closed", &settings).unwrap();
-        let earned = evaluated(&model, &Controller::new(&automaton), 100_000).discounted;
+        let earned = evaluated(&scenario, &Controller::new(&automaton), 100_000).discounted;
         assert!(earned.mean >= 4.05, "{matching:?}: {earned:?}");
         assert!(
             earned.mean <= planned + 3.0 * earned.stderr,

@@ -3,10 +3,11 @@
 
 use pilotage::Error;
 use pilotage::belief::{Belief, BeliefMdp};
-use pilotage::model::{self, Model};
+use pilotage::model::{Interval, Model, Region};
 use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller, Policy};
 use pilotage::random::{Rng, Role, normal, stream};
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Options;
 use pilotage::solve::{Form, Solution, SolveSettings, Solved, SolverKind, rollout, solve};
 use pilotage::solve::{arkaq, kafaq};
@@ -48,12 +49,12 @@ fn small(model: &Model, form: Form) -> SolveSettings {
 }
 
 /// Every pair of a built-in model and a solver.
-fn pairs() -> impl Iterator<Item = (Model, SolverKind)> {
-    model::names().flat_map(|name| {
-        let model = model::find(name).unwrap();
+fn pairs() -> impl Iterator<Item = (Scenario, SolverKind)> {
+    scenario::names().flat_map(|name| {
+        let scenario = scenario::find(name).unwrap();
         SolverKind::ALL
             .into_iter()
-            .map(move |kind| (model.clone(), kind))
+            .map(move |kind| (scenario.clone(), kind))
     })
 }
 
@@ -146,7 +147,8 @@ fn check_automaton(mdp: &BeliefMdp, automaton: &Automaton, what: &str) {
     loaded.check_problem(mdp.model(), "policy.json").unwrap();
 }
 
-fn check_value(model: &Model, solution: &Solution, what: &str) {
+fn check_value(scenario: &Scenario, solution: &Solution, what: &str) {
+    let model = &scenario.model;
     let (low, high) = bounds(model);
     let slack = 0.02 * (high - low).min(1e6);
     if let Some(value) = solution.planned_value {
@@ -159,7 +161,7 @@ fn check_value(model: &Model, solution: &Solution, what: &str) {
         episodes: 20,
         seed: 3,
     };
-    let evaluation = solution.evaluate(model, options, &Silent);
+    let evaluation = solution.evaluate(scenario, options, &Silent).unwrap();
     assert_eq!(evaluation.episodes, 20);
     let mean = evaluation.discounted.mean;
     assert!(
@@ -176,12 +178,13 @@ fn check_value(model: &Model, solution: &Solution, what: &str) {
 #[test]
 fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
     let mut solved = 0;
-    let accepted = pairs().filter(|(model, kind)| kind.accepts(model).is_ok());
-    for (model, kind) in accepted {
-        let mdp = BeliefMdp::new(&model);
+    let accepted = pairs().filter(|(scenario, kind)| kind.accepts(&scenario.model).is_ok());
+    for (scenario, kind) in accepted {
+        let model = &scenario.model;
+        let mdp = BeliefMdp::new(model);
         for form in Form::ALL {
             let what = format!("{} with {} as {}", model.name, kind.name(), form.name());
-            let solution = solve(kind, &model, &small(&model, form), &Silent)
+            let solution = solve(kind, &scenario, &small(model, form), &Silent)
                 .unwrap_or_else(|error| panic!("{what}: {error}"));
             match &solution.policy {
                 Solved::Automaton(automaton) => {
@@ -196,7 +199,7 @@ fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
                 }
                 Solved::Control(_) => assert!(model.cost.is_some(), "{what}"),
             }
-            check_value(&model, &solution, &what);
+            check_value(&scenario, &solution, &what);
             solved += 1;
         }
     }
@@ -205,8 +208,9 @@ fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
 
 #[test]
 fn a_solver_that_does_not_accept_a_model_says_why_and_what_would_do() {
-    for (model, kind) in pairs() {
-        let Err(error) = kind.accepts(&model) else {
+    for (scenario, kind) in pairs() {
+        let model = &scenario.model;
+        let Err(error) = kind.accepts(model) else {
             continue;
         };
         let Error::Unsupported {
@@ -224,7 +228,7 @@ fn a_solver_that_does_not_accept_a_model_says_why_and_what_would_do() {
                 .any(|hint| reason.contains(hint)),
             "{error}"
         );
-        let refused = solve(kind, &model, &SolveSettings::default(), &Silent);
+        let refused = solve(kind, &scenario, &SolveSettings::default(), &Silent);
         assert_eq!(
             refused.map(|_| ()).unwrap_err().to_string(),
             error.to_string()
@@ -234,8 +238,8 @@ fn a_solver_that_does_not_accept_a_model_says_why_and_what_would_do() {
 
 #[test]
 fn every_model_has_a_solver_and_every_solver_a_model() {
-    for name in model::names() {
-        let model = model::find(name).unwrap();
+    for name in scenario::names() {
+        let model = scenario::find(name).unwrap().model;
         assert!(
             SolverKind::ALL
                 .iter()
@@ -244,7 +248,9 @@ fn every_model_has_a_solver_and_every_solver_a_model() {
         );
     }
     for kind in SolverKind::ALL {
-        assert!(pairs().any(|(model, other)| other == kind && kind.accepts(&model).is_ok()));
+        assert!(
+            pairs().any(|(scenario, other)| other == kind && kind.accepts(&scenario.model).is_ok())
+        );
         assert_eq!(SolverKind::parse(kind.name()).unwrap(), kind);
         assert!(!kind.about().is_empty());
     }
@@ -268,8 +274,8 @@ fn misspelt_names_bring_the_nearest() {
 }
 
 /// A corridor with a second variable `y` that drifts by `factor` a step, is sensed by `sensed` and disturbed by `noise`.
-fn with_drift(factor: f64, sensed: f64, noise: f64) -> Model {
-    let text = model::builtin("corridor-unbounded").unwrap();
+fn with_drift(factor: f64, sensed: f64, noise: f64) -> Scenario {
+    let text = scenario::builtin("corridor-unbounded").unwrap();
     let text = text
         .replace("names = [\"x\"]", "names = [\"x\", \"y\"]")
         .replace(
@@ -295,7 +301,7 @@ fn with_drift(factor: f64, sensed: f64, noise: f64) -> Model {
             &format!("H = [[1.0, 0.0], [0.0, {sensed:?}]]"),
         )
         .replace("noise = [[0.45]]", "noise = [[0.45, 0.0], [0.0, 0.45]]");
-    model::read(&text, "drift.toml").unwrap_or_else(|error| panic!("{error}"))
+    scenario::read(&text, "drift.toml").unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
@@ -308,9 +314,9 @@ fn uncertainty_that_grows_for_ever_is_refused_with_its_direction() {
             SolverKind::Qmdp,
             SolverKind::Mls,
         ] {
-            let model = with_drift(factor, 0.0, 0.1);
-            let settings = small(&model, Form::Nearest);
-            let error = solve(kind, &model, &settings, &Silent)
+            let scenario = with_drift(factor, 0.0, 0.1);
+            let settings = small(&scenario.model, Form::Nearest);
+            let error = solve(kind, &scenario, &settings, &Silent)
                 .map(|_| ())
                 .unwrap_err();
             let Error::NoSteadyState { direction, .. } = &error else {
@@ -325,23 +331,28 @@ fn uncertainty_that_grows_for_ever_is_refused_with_its_direction() {
         }
     }
     // Detectable: sensed, or dying out by itself.
-    for model in [with_drift(1.2, 1.0, 0.1), with_drift(0.9, 0.0, 0.1)] {
-        let settings = small(&model, Form::Grid);
-        solve(SolverKind::Mls, &model, &settings, &Silent).unwrap();
+    for scenario in [with_drift(1.2, 1.0, 0.1), with_drift(0.9, 0.0, 0.1)] {
+        let settings = small(&scenario.model, Form::Grid);
+        solve(SolverKind::Mls, &scenario, &settings, &Silent).unwrap();
     }
 }
 
 #[test]
 fn a_regulator_that_cannot_be_is_refused_with_its_direction() {
     // `y` runs away, costs, and no action moves it.
-    let mut model = with_drift(1.2, 1.0, 0.1);
-    model.episode.alive = pilotage::model::Region::new(vec![
-        (0, pilotage::model::Interval::new(-1.0, 1.0)),
-        (1, pilotage::model::Interval::new(-1.0, 1.0)),
+    let mut scenario = with_drift(1.2, 1.0, 0.1);
+    scenario.model.episode.alive = Region::new(vec![
+        (0, Interval::new(-1.0, 1.0)),
+        (1, Interval::new(-1.0, 1.0)),
     ]);
-    let error = solve(SolverKind::Lqg, &model, &SolveSettings::default(), &Silent)
-        .map(|_| ())
-        .unwrap_err();
+    let error = solve(
+        SolverKind::Lqg,
+        &scenario,
+        &SolveSettings::default(),
+        &Silent,
+    )
+    .map(|_| ())
+    .unwrap_err();
     let Error::NoSteadyState {
         what, direction, ..
     } = &error
@@ -359,14 +370,14 @@ fn a_regulator_that_cannot_be_is_refused_with_its_direction() {
 
 #[test]
 fn a_grid_that_is_too_large_is_refused_with_its_size() {
-    let model = model::find("maze-2d").unwrap();
+    let scenario = scenario::find("maze-2d").unwrap();
     for kind in [SolverKind::KbviClosed, SolverKind::Qmdp, SolverKind::Mls] {
         let settings = SolveSettings {
             points: Some(1001),
             memory: 16,
             ..Default::default()
         };
-        let error = solve(kind, &model, &settings, &Silent)
+        let error = solve(kind, &scenario, &settings, &Silent)
             .map(|_| ())
             .unwrap_err();
         let Error::TooLarge {

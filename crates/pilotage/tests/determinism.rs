@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::built_in;
+use common::{built_in, scenario};
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Matching, Policy};
@@ -39,8 +39,8 @@ fn bits(evaluation: &Evaluation) -> Vec<u64> {
 }
 
 fn solved(name: &str, points: usize, matching: Matching) -> (Vec<u64>, Automaton, Vec<u64>) {
-    let model = built_in(name);
-    let mdp = BeliefMdp::new(&model);
+    let scenario = scenario(name);
+    let mdp = BeliefMdp::new(&scenario.model);
     let settings = closed::Settings {
         points: Some(points),
         tolerance: 1e-5,
@@ -49,7 +49,7 @@ fn solved(name: &str, points: usize, matching: Matching) -> (Vec<u64>, Automaton
     let policy = closed::solve(&mdp, &settings, &Silent).unwrap();
     let values = (0..50)
         .map(|k| {
-            let mean = vec![f64::from(k) / 10.0; model.state_dim()];
+            let mean = vec![f64::from(k) / 10.0; scenario.model.state_dim()];
             let belief = Belief {
                 mean,
                 ..mdp.start().clone()
@@ -68,7 +68,7 @@ fn solved(name: &str, points: usize, matching: Matching) -> (Vec<u64>, Automaton
         episodes: 1001,
         seed: 7,
     };
-    let evaluation = evaluate(&model, &mdp.filter(), &automaton, options, &Silent);
+    let evaluation = evaluate(&scenario, &mdp.filter(), &automaton, options, &Silent);
     (values, automaton, bits(&evaluation))
 }
 
@@ -108,8 +108,8 @@ fn generating_does_not_depend_on_threads() {
 
 #[test]
 fn another_seed_gives_other_episodes() {
-    let model = built_in("corridor");
-    let mdp = BeliefMdp::new(&model);
+    let scenario = scenario("corridor");
+    let mdp = BeliefMdp::new(&scenario.model);
     let earned = |seed| {
         let policy =
             pilotage::policy::Controller::new(&Automaton::new(&mdp, "east", Matching::Nearest));
@@ -117,7 +117,13 @@ fn another_seed_gives_other_episodes() {
             episodes: 100,
             seed,
         };
-        bits(&evaluate(&model, &mdp.filter(), &policy, options, &Silent))
+        bits(&evaluate(
+            &scenario,
+            &mdp.filter(),
+            &policy,
+            options,
+            &Silent,
+        ))
     };
     assert_eq!(earned(1), earned(1));
     assert_ne!(earned(1), earned(2));

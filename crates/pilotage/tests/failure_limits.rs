@@ -2,9 +2,10 @@
 
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::error::Error;
-use pilotage::model::{ActionId, Interval, Model, Region, find, read};
+use pilotage::model::{ActionId, Interval, Model, Region};
 use pilotage::observe::Silent;
 use pilotage::policy::{Controller, Policy};
+use pilotage::scenario::{Scenario, find, read};
 use pilotage::simulate::{LifeOptions, Options, evaluate, life};
 use pilotage::solve::hazard::{Runs, Sample};
 use pilotage::solve::kbvi::{closed, quadratic};
@@ -49,7 +50,9 @@ alive = {{ x = [-2.0, 2.0] }}
 failure_reward = {failure_reward:?}
 "#
     );
-    read(&text, "edge.toml").unwrap_or_else(|error| panic!("{error}"))
+    read(&text, "edge.toml")
+        .unwrap_or_else(|error| panic!("{error}"))
+        .model
 }
 
 /// The sensor is so good that the belief is all but the state, so that the planned value is that of the world: apart by less than
@@ -65,7 +68,13 @@ fn value_iteration_counts_failures() {
             episodes: 20_000,
             seed: 3,
         };
-        let earned = evaluate(&model, &mdp.filter(), &policy, options, &Silent);
+        let earned = evaluate(
+            &Scenario::assumed(&model),
+            &mdp.filter(),
+            &policy,
+            options,
+            &Silent,
+        );
         assert!(
             earned.failed > 0.5,
             "failures matter here: {}",
@@ -117,7 +126,13 @@ fn lives_are_counted_exactly() {
         steps: 10,
         seed: 1,
     };
-    let life = life(&model, &filter, &Always(1), options, &Silent);
+    let life = life(
+        &Scenario::assumed(&model),
+        &filter,
+        &Always(1),
+        options,
+        &Silent,
+    );
     assert_eq!((life.steps(), life.failures(), life.early()), (20, 6, 6));
     let mean = life.mean().unwrap();
     assert!((mean.mean - 20.0 / 6.0).abs() < 1e-12);
@@ -126,7 +141,7 @@ fn lives_are_counted_exactly() {
 }
 
 fn pole(name: &str, effort: f64) -> (Model, BeliefMdp, quadratic::Settings) {
-    let model = find(name).expect("a built-in model");
+    let model = find(name).expect("a built-in model").model;
     let mdp = BeliefMdp::new(&model);
     let settings = quadratic::Settings {
         effort,
@@ -140,7 +155,6 @@ fn pole(name: &str, effort: f64) -> (Model, BeliefMdp, quadratic::Settings) {
 #[test]
 fn hazard_foretells_life() {
     let (mut model, _, settings) = pole("cart-pole-noisy", 0.02);
-    model.world.kind = Default::default();
     // Limits closer by a fifth make lives short enough to be counted.
     for (_, side) in &mut model.episode.alive.sides {
         *side = Interval::new(0.8 * side.low, 0.8 * side.high);
@@ -160,7 +174,13 @@ fn hazard_foretells_life() {
         steps: 30_000,
         seed: 11,
     };
-    let counted = life(&model, &automaton.filter, &policy, options, &Silent);
+    let counted = life(
+        &Scenario::assumed(&model),
+        &automaton.filter,
+        &policy,
+        options,
+        &Silent,
+    );
     let ratio = counted.failures() as f64 / counted.steps() as f64 / foretold;
     assert!(
         (0.4..2.5).contains(&ratio),

@@ -3,11 +3,12 @@
 
 mod common;
 
-use common::built_in;
+use common::{built_in, scenario};
 use pilotage::model::{
-    self, Event, Fingerprint, HypothesisBelief, Interval, Model, QuadraticCost, Region, StartShape,
-    StateVariable, Then, TrueControl, WallBelief, Walls, When, WorldKind, WorldSpec,
+    Event, Fingerprint, HypothesisBelief, Interval, Model, QuadraticCost, Region, StartShape,
+    StateVariable, Then, WallBelief, When,
 };
+use pilotage::scenario::{self, Scenario, Simulator, TrueControl, Truth, Walls};
 
 /// Every table and key that a model can have.
 const RICH: &str = r#"
@@ -99,8 +100,12 @@ mode = "full"
 u = [-1.0]
 "#;
 
+fn rich_scenario() -> Scenario {
+    scenario::read(RICH, "rich.toml").unwrap()
+}
+
 fn rich() -> Model {
-    model::read(RICH, "rich.toml").unwrap()
+    rich_scenario().model
 }
 
 type Change<M> = (&'static str, fn(&mut M));
@@ -226,31 +231,31 @@ fn cost(model: &mut Model) -> &mut QuadraticCost {
 }
 
 /// One change of everything that is true of the world alone.
-const CHANGES_OF_THE_WORLD: &[Change<WorldSpec>] = &[
-    ("all", |w| *w = WorldSpec::default()),
-    ("kind, cart and pole", |w| {
-        w.kind = built_in("cart-pole").world.kind
+const CHANGES_OF_THE_TRUTH: &[Change<Truth>] = &[
+    ("all", |t| *t = Truth::default()),
+    ("simulator, cart and pole", |t| {
+        t.simulator = scenario("cart-pole").truth.simulator
     }),
-    ("kind, robot", |w| {
-        w.kind = built_in("robot-basic").world.kind
+    ("simulator, robot", |t| {
+        t.simulator = scenario("robot-basic").truth.simulator
     }),
-    ("walls", |w| w.walls = Walls::None),
-    ("start", |w| w.start = None),
-    ("start.mean", |w| w.start.as_mut().unwrap()[0].mean[0] = 0.5),
-    ("motion.noise", |w| w.motion.noise = None),
-    ("motion.noise of x", |w| {
-        w.motion.noise.as_mut().unwrap()[(0, 0)] = 0.25
+    ("walls", |t| t.walls = Walls::None),
+    ("start", |t| t.start = None),
+    ("start.mean", |t| t.start.as_mut().unwrap()[0].mean[0] = 0.5),
+    ("motion.noise", |t| t.motion.noise = None),
+    ("motion.noise of x", |t| {
+        t.motion.noise.as_mut().unwrap()[(0, 0)] = 0.25
     }),
-    ("motion.controls", |w| w.motion.controls.clear()),
-    ("motion.controls.actions", |w| {
-        w.motion.controls[0].actions = None
+    ("motion.controls", |t| t.motion.controls.clear()),
+    ("motion.controls.actions", |t| {
+        t.motion.controls[0].actions = None
     }),
-    ("motion.controls.mode", |w| w.motion.controls[0].mode = None),
-    ("motion.controls.control", |w| {
-        w.motion.controls[0].control[0] = 0.0
+    ("motion.controls.mode", |t| t.motion.controls[0].mode = None),
+    ("motion.controls.control", |t| {
+        t.motion.controls[0].control[0] = 0.0
     }),
-    ("motion.controls, one more", |w| {
-        w.motion.controls.push(TrueControl {
+    ("motion.controls, one more", |t| {
+        t.motion.controls.push(TrueControl {
             actions: None,
             mode: None,
             control: nalgebra::dvector![0.0],
@@ -274,32 +279,36 @@ fn all_differ<M: Clone>(original: &M, changes: &[Change<M>], of: fn(&M) -> Finge
 #[test]
 fn every_field_changes_it() {
     all_differ(&rich(), CHANGES, Model::fingerprint);
-    all_differ(&rich().world, CHANGES_OF_THE_WORLD, WorldSpec::fingerprint);
+    all_differ(
+        &rich_scenario().truth,
+        CHANGES_OF_THE_TRUTH,
+        Truth::fingerprint,
+    );
 }
 
 /// The plants' parameters, all of which are numbers.
 #[test]
 fn every_parameter_of_a_plant_changes_it() {
     for name in ["cart-pole", "robot-basic"] {
-        let world = built_in(name).world;
-        let parameters = match &world.kind {
-            WorldKind::CartPole(parameters) => serde_json::to_value(parameters).unwrap(),
-            WorldKind::Robot(robot) => serde_json::to_value(robot).unwrap(),
-            WorldKind::Linear => panic!("{name} has no plant"),
+        let truth = scenario(name).truth;
+        let parameters = match &truth.simulator {
+            Simulator::CartPole(parameters) => serde_json::to_value(parameters).unwrap(),
+            Simulator::Robot(robot) => serde_json::to_value(robot).unwrap(),
+            Simulator::Linear => panic!("{name} has no plant"),
         };
-        let mut seen = vec![world.fingerprint()];
+        let mut seen = vec![truth.fingerprint()];
         for key in parameters.as_object().unwrap().keys() {
             let mut changed = parameters.clone();
             changed[key] = (changed[key].as_f64().unwrap_or(0.0) + 0.125).into();
-            let kind = match &world.kind {
-                WorldKind::CartPole(_) => {
-                    WorldKind::CartPole(serde_json::from_value(changed).unwrap())
+            let simulator = match &truth.simulator {
+                Simulator::CartPole(_) => {
+                    Simulator::CartPole(serde_json::from_value(changed).unwrap())
                 }
-                _ => WorldKind::Robot(serde_json::from_value(changed).unwrap()),
+                _ => Simulator::Robot(serde_json::from_value(changed).unwrap()),
             };
-            let fingerprint = WorldSpec {
-                kind,
-                ..world.clone()
+            let fingerprint = Truth {
+                simulator,
+                ..truth.clone()
             }
             .fingerprint();
             assert!(!seen.contains(&fingerprint), "{name}: {key}");
@@ -314,7 +323,6 @@ fn words_zeros_and_defaults_do_not_change_it() {
     let changes: &[Change<Model>] = &[
         ("name", |m| m.name.push('1')),
         ("about", |m| m.about.push('1')),
-        ("world", |m| m.world = WorldSpec::default()),
         ("-0 in a matrix", |m| m.motion.a[(1, 0)] = -0.0),
         ("-0 in a vector", |m| m.actions[1].control[0] = -0.0),
         ("-0 of a bound", |m| m.state[0].bounds.low = -0.0),
@@ -404,7 +412,7 @@ fn it_is_read_as_it_is_written_and_in_no_other_way() {
 fn fingerprints_of_the_built_in_models_stay() {
     let golden = include_str!("fixtures/fingerprints.txt");
     let golden: Vec<&str> = golden.lines().collect();
-    let current: Vec<String> = model::names()
+    let current: Vec<String> = scenario::names()
         .map(|name| format!("{name} {}", built_in(name).fingerprint()))
         .collect();
     assert_eq!(

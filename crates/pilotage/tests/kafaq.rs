@@ -6,21 +6,22 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use pilotage::belief::BeliefMdp;
-use pilotage::model::{self, Model};
+use pilotage::model::{Interval, Model};
 use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller, Place};
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{LifeOptions, Options, compare, evaluate, life};
 use pilotage::solve::kafaq::{self, Learned, Rules, Run, Settings};
 use pilotage::solve::kbvi::closed;
 use pilotage::world::{ProblemWorld, World};
 use pilotage::{Error, Result};
 
-fn model(name: &str) -> Model {
-    model::find(name).unwrap_or_else(|error| panic!("{error}"))
+fn scenario(name: &str) -> Scenario {
+    scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn learn_in(
-    world: &Model,
+    world: &Scenario,
     told: &Model,
     settings: &Settings,
     checkpoint: Option<&Path>,
@@ -29,8 +30,8 @@ fn learn_in(
     kafaq::learn(told, &worlds, settings, checkpoint, &Silent)
 }
 
-fn learn(model: &Model, settings: &Settings) -> Learned {
-    learn_in(model, model, settings, None).unwrap()
+fn learn(scenario: &Scenario, settings: &Settings) -> Learned {
+    learn_in(scenario, &scenario.model, settings, None).unwrap()
 }
 
 /// Settings of a run that ends soon, wherever it has come.
@@ -66,8 +67,8 @@ fn the_hallway_is_learned_in_three_regions_as_well_as_it_can_be_planned() {
         seed: 77,
     };
     for name in ["basic", "basic-inner"] {
-        let model = model(name);
-        let learned = learn(&model, &Settings::default());
+        let scenario = scenario(name);
+        let learned = learn(&scenario, &Settings::default());
         assert!(learned.converged, "{name}");
         assert!(
             learned.automaton.nodes.len() <= 3,
@@ -75,15 +76,15 @@ fn the_hallway_is_learned_in_three_regions_as_well_as_it_can_be_planned() {
             places(&learned.automaton)
         );
         let plan = closed::solve(
-            &BeliefMdp::new(&model),
+            &BeliefMdp::new(&scenario.model),
             &closed::Settings::default(),
             &Silent,
         )
         .unwrap();
-        let best = evaluate(&model, &plan.mdp().filter(), &plan, options, &Silent);
+        let best = evaluate(&scenario, &plan.mdp().filter(), &plan, options, &Silent);
         let controller = Controller::new(&learned.automaton);
         let earned = evaluate(
-            &model,
+            &scenario,
             &learned.automaton.filter,
             &controller,
             options,
@@ -98,8 +99,8 @@ fn the_hallway_is_learned_in_three_regions_as_well_as_it_can_be_planned() {
 
 #[test]
 fn a_hidden_load_becomes_nodes_at_the_same_place_with_opposite_actions() {
-    let model = model("cart-load-unload");
-    let learned = learn(&model, &Settings::default());
+    let scenario = scenario("cart-load-unload");
+    let learned = learn(&scenario, &Settings::default());
     let nodes = places(&learned.automaton);
     let opposite = nodes.iter().any(|a| {
         nodes
@@ -116,7 +117,7 @@ fn a_hidden_load_becomes_nodes_at_the_same_place_with_opposite_actions() {
     };
     for action in 0..2 {
         let difference = compare(
-            &model,
+            &scenario,
             &learned.automaton.filter,
             &Controller::new(&learned.automaton),
             &Controller::new(&one_way(action)),
@@ -134,9 +135,10 @@ fn a_hidden_load_becomes_nodes_at_the_same_place_with_opposite_actions() {
 /// 0.001 on evidence that a proposal was chosen without; a split must also be worth having, which chance alone does not give.
 #[test]
 fn nothing_is_split_where_all_actions_are_alike() {
-    let mut same = model("basic");
-    same.actions[1].control = same.actions[0].control.clone();
-    same.rewards.retain(|reward| reward.actions.is_none());
+    let mut same = scenario("basic");
+    let model = &mut same.model;
+    model.actions[1].control = model.actions[0].control.clone();
+    model.rewards.retain(|reward| reward.actions.is_none());
     for seed in 1..=5 {
         let learned = learn(
             &same,
@@ -151,8 +153,8 @@ fn nothing_is_split_where_all_actions_are_alike() {
 
 #[test]
 fn a_run_is_its_seed() {
-    let model = model("cart-load-unload");
-    let [first, again, other] = [3, 3, 4].map(|seed| learn(&model, &hurried(seed)));
+    let scenario = scenario("cart-load-unload");
+    let [first, again, other] = [3, 3, 4].map(|seed| learn(&scenario, &hurried(seed)));
     assert_eq!(first, again);
     assert_ne!(first.learning.curve, other.learning.curve);
 }
@@ -160,12 +162,12 @@ fn a_run_is_its_seed() {
 /// The learner is told another model's rewards, events and modes than those of the world it acts in, and does not care.
 #[test]
 fn rewards_and_map_are_learned_and_not_read() {
-    let world = model("cart-load-unload");
-    let mut told = world.clone();
-    told.rewards = model("basic").rewards;
+    let world = scenario("cart-load-unload");
+    let mut told = world.model.clone();
+    told.rewards = scenario("basic").model.rewards;
     told.events.clear();
     told.modes = vec![String::new()];
-    let honest = learn_in(&world, &world, &hurried(1), None).unwrap();
+    let honest = learn_in(&world, &world.model, &hurried(1), None).unwrap();
     let misled = learn_in(&world, &told, &hurried(1), None).unwrap();
     assert_eq!(honest.learning.curve, misled.learning.curve);
     assert_eq!(places(&honest.automaton), places(&misled.automaton));
@@ -173,47 +175,47 @@ fn rewards_and_map_are_learned_and_not_read() {
 
 #[test]
 fn an_automaton_runs_from_its_file_as_it_was_learned() {
-    let model = model("cart-load-unload");
-    let learned = learn(&model, &hurried(2));
+    let scenario = scenario("cart-load-unload");
+    let learned = learn(&scenario, &hurried(2));
     let read = Automaton::from_json(&learned.automaton.to_json().unwrap(), "x").unwrap();
     assert_eq!(read, learned.automaton);
-    assert!(read.check_problem(&model, "x").is_ok());
+    assert!(read.check_problem(&scenario.model, "x").is_ok());
     assert_eq!(read.modes.len(), 3, "{:?}", read.modes);
 }
 
 #[test]
 fn the_printed_rules_run_and_make_dust() {
-    let model = model("basic");
+    let scenario = scenario("basic");
     let settings = Settings {
         rules: Rules::Printed,
         ..Settings::default()
     };
-    let learned = learn(&model, &settings);
+    let learned = learn(&scenario, &settings);
     assert!(
         learned.automaton.nodes.len() > 100,
         "{}",
         learned.automaton.nodes.len()
     );
     assert!(!learned.converged);
-    assert_eq!(learned, learn(&model, &settings));
+    assert_eq!(learned, learn(&scenario, &settings));
 }
 
 #[test]
 fn a_resumed_run_ends_like_one_that_was_never_stopped() {
-    let model = model("cart-load-unload");
+    let scenario = scenario("cart-load-unload");
     let settings = hurried(5);
-    let straight = learn(&model, &settings);
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&model)) };
+    let straight = learn(&scenario, &settings);
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&scenario)) };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.json");
     for pieces in [1, 5, 9] {
-        let mut run = Run::new(&model, &worlds, &settings).unwrap();
+        let mut run = Run::new(&scenario.model, &worlds, &settings).unwrap();
         for _ in 0..pieces {
             run.advance(&Silent);
         }
         run.save(&path).unwrap();
         assert_eq!(
-            learn_in(&model, &model, &settings, Some(&path)).unwrap(),
+            learn_in(&scenario, &scenario.model, &settings, Some(&path)).unwrap(),
             straight
         );
         std::fs::remove_file(&path).unwrap();
@@ -236,8 +238,8 @@ fn lengthy() -> Settings {
 fn child_that_is_killed() {
     if let Some(path) = std::env::var_os(CHILD) {
         learn_in(
-            &model("cart-load-unload"),
-            &model("cart-load-unload"),
+            &scenario("cart-load-unload"),
+            &scenario("cart-load-unload").model,
             &lengthy(),
             Some(Path::new(&path)),
         )
@@ -247,11 +249,11 @@ fn child_that_is_killed() {
 
 #[test]
 fn a_run_survives_being_killed_at_any_moment() {
-    let model = model("cart-load-unload");
-    let straight = learn(&model, &lengthy());
+    let scenario = scenario("cart-load-unload");
+    let straight = learn(&scenario, &lengthy());
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.json");
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&model)) };
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&scenario)) };
     let mut killed = 0;
     for round in 0..200_u64 {
         let mut child = Command::new(std::env::current_exe().unwrap())
@@ -269,7 +271,7 @@ fn a_run_survives_being_killed_at_any_moment() {
         child.wait().unwrap();
         if path.exists() {
             // Whole, and of this run.
-            let run = Run::resume(&model, &worlds, &lengthy(), &path).unwrap();
+            let run = Run::resume(&scenario.model, &worlds, &lengthy(), &path).unwrap();
             if run.finished() {
                 break;
             }
@@ -277,22 +279,22 @@ fn a_run_survives_being_killed_at_any_moment() {
     }
     assert!(killed > 0);
     assert_eq!(
-        learn_in(&model, &model, &lengthy(), Some(&path)).unwrap(),
+        learn_in(&scenario, &scenario.model, &lengthy(), Some(&path)).unwrap(),
         straight
     );
 }
 
 /// A checkpoint after one piece of work.
-fn checkpoint(model: &Model, settings: &Settings, path: &Path) {
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
-    let mut run = Run::new(model, &worlds, settings).unwrap();
+fn checkpoint(scenario: &Scenario, settings: &Settings, path: &Path) {
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(scenario)) };
+    let mut run = Run::new(&scenario.model, &worlds, settings).unwrap();
     run.advance(&Silent);
     run.save(path).unwrap();
 }
 
-fn refusal(model: &Model, settings: &Settings, path: &Path) -> String {
+fn refusal(scenario: &Scenario, settings: &Settings, path: &Path) -> String {
     let before = std::fs::read(path).unwrap();
-    let error = learn_in(model, model, settings, Some(path))
+    let error = learn_in(scenario, &scenario.model, settings, Some(path))
         .map(drop)
         .unwrap_err();
     assert!(matches!(error, Error::Checkpoint { .. }), "{error}");
@@ -304,14 +306,14 @@ fn refusal(model: &Model, settings: &Settings, path: &Path) -> String {
 fn checkpoints_of_other_runs_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.json");
-    let basic = model("basic");
+    let basic = scenario("basic");
     checkpoint(&basic, &hurried(1), &path);
     assert!(
-        refusal(&model("basic-inner"), &hurried(1), &path)
+        refusal(&scenario("basic-inner"), &hurried(1), &path)
             .contains("problem basic, not of basic-inner")
     );
     let mut changed = basic.clone();
-    changed.sensor.noise *= 2.0;
+    changed.model.sensor.noise *= 2.0;
     assert!(refusal(&changed, &hurried(1), &path).contains("has changed"));
     assert!(refusal(&basic, &hurried(2), &path).contains("other settings or another seed"));
     let text = std::fs::read_to_string(&path).unwrap();
@@ -341,7 +343,7 @@ fn checkpoints_of_other_runs_are_refused() {
 fn a_damaged_checkpoint_is_refused_whatever_was_damaged() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.json");
-    let basic = model("basic");
+    let basic = scenario("basic");
     checkpoint(&basic, &hurried(1), &path);
     let whole = std::fs::read(&path).unwrap();
     let state = whole.iter().position(|&byte| byte == b'\n').unwrap();
@@ -367,8 +369,8 @@ fn a_damaged_checkpoint_is_refused_whatever_was_damaged() {
 fn a_checkpoint_that_cannot_be_written_is_an_error_and_leaves_the_last() {
     let folder = tempfile::tempdir().unwrap();
     let gone = folder.path().join("no/such/folder/run.json");
-    let basic = model("basic");
-    let error = learn_in(&basic, &basic, &hurried(1), Some(&gone))
+    let basic = scenario("basic");
+    let error = learn_in(&basic, &basic.model, &hurried(1), Some(&gone))
         .map(drop)
         .unwrap_err();
     assert!(matches!(error, Error::Io { .. }), "{error}");
@@ -412,11 +414,11 @@ fn settings_out_of_range_are_refused_by_name() {
         ("odds", |s| s.odds.clear()),
         ("trial", |s| s.trial = 1),
     ];
-    let basic = model("basic");
+    let basic = scenario("basic");
     for (name, spoil) in cases {
         let mut settings = Settings::default();
         spoil(&mut settings);
-        let error = learn_in(&basic, &basic, &settings, None)
+        let error = learn_in(&basic, &basic.model, &settings, None)
             .map(drop)
             .unwrap_err();
         assert!(
@@ -428,28 +430,28 @@ fn settings_out_of_range_are_refused_by_name() {
 
 #[test]
 fn models_it_is_not_made_for_are_refused_with_a_reason() {
-    let mut unbounded = model("basic");
-    unbounded.state[0].bounds = model::Interval::ALL;
-    for (model, reason) in [
+    let mut unbounded = scenario("basic");
+    unbounded.model.state[0].bounds = Interval::ALL;
+    for (scenario, reason) in [
         (unbounded, "`state.bounds`"),
-        (model("load-unload"), "known exactly"),
+        (scenario("load-unload"), "known exactly"),
     ] {
-        let error = learn_in(&model, &model, &Settings::default(), None)
+        let error = learn_in(&scenario, &scenario.model, &Settings::default(), None)
             .map(drop)
             .unwrap_err();
         assert!(matches!(error, Error::Unsupported { .. }), "{error}");
         assert!(
             error.to_string().contains(reason),
             "{}: {error}",
-            model.name
+            scenario.model.name
         );
     }
     let coarse = Settings {
         cell_limit: 5,
         ..Settings::default()
     };
-    let basic = model("basic");
-    let error = learn_in(&basic, &basic, &coarse, None)
+    let basic = scenario("basic");
+    let error = learn_in(&basic, &basic.model, &coarse, None)
         .map(drop)
         .unwrap_err();
     assert!(error.to_string().contains("neighbourhoods"), "{error}");
@@ -458,17 +460,17 @@ fn models_it_is_not_made_for_are_refused_with_a_reason() {
 /// Cart and pole: regions lie along the modes of the motion that do not die out by themselves, the fall and the drift.
 #[test]
 fn a_pole_is_balanced_by_a_few_regions_of_its_own_motion() {
-    let model = model("cart-pole-sd");
+    let scenario = scenario("cart-pole-sd");
     let coarse = Settings {
         cells_along: 32,
         ..Settings::default()
     };
-    let learned = learn(&model, &coarse);
+    let learned = learn(&scenario, &coarse);
     assert!(learned.converged);
     let coordinates = learned.automaton.coordinates.as_ref().unwrap();
     for (row, value) in coordinates.rows.iter().zip([1.1177, 1.0]) {
         let row = nalgebra::RowDVector::from_row_slice(row);
-        let apart = &row * &model.motion.a - &row * value;
+        let apart = &row * &scenario.model.motion.a - &row * value;
         assert!(apart.amax() < 1e-4, "{value}: {apart}");
     }
     let options = LifeOptions {
@@ -478,7 +480,7 @@ fn a_pole_is_balanced_by_a_few_regions_of_its_own_motion() {
     };
     let controller = Controller::new(&learned.automaton);
     let life = life(
-        &model,
+        &scenario,
         &learned.automaton.filter,
         &controller,
         options,

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, dmatrix};
 use pilotage::Error;
-use pilotage::model::find;
+use pilotage::scenario::find;
 use pilotage::solve::lqr::lqr_gain;
 
 /// In one dimension with `a = b = 1` the cost solves `p^2 = q p + q r`.
@@ -20,7 +20,7 @@ fn scalar_gain_is_the_closed_form() {
 }
 
 fn cart_pole() -> (DMatrix<f64>, DMatrix<f64>) {
-    let model = find("cart-pole").expect("a built-in model");
+    let model = find("cart-pole").expect("a built-in model").model;
     (model.motion.a, model.motion.b)
 }
 

@@ -2,15 +2,16 @@
 #![allow(clippy::unwrap_used)]
 
 use pilotage::model::{self, Map, Model};
+use pilotage::scenario;
 use proptest::prelude::*;
 
 fn read(drawing: &str, cell: f64) -> Result<Model, model::ModelError> {
-    let text = model::builtin("maze-2d").unwrap();
+    let text = scenario::builtin("maze-2d").unwrap();
     let text = text.replace("cell = 1.0", &format!("cell = {cell:?}"));
     let text = text
         .replace("....\n....\n....\n...*\n", drawing)
         .replace("mean = [0.0, 4.0]", "mean = [0.0, 0.0]");
-    model::read(&text, "map.toml")
+    scenario::read(&text, "map.toml").map(|scenario| scenario.model)
 }
 
 fn map(drawing: &str, cell: f64) -> Map {

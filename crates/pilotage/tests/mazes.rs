@@ -4,16 +4,17 @@
 use std::sync::OnceLock;
 
 use pilotage::belief::{Belief, BeliefMdp};
-use pilotage::model::{self, Model, WallBelief};
+use pilotage::model::WallBelief;
 use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Policy};
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Options, evaluate};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::kbvi::closed::{self, GridPolicy};
 use pilotage::world::{Draws, ProblemWorld, World};
 
-fn find(name: &str) -> Model {
-    model::find(name).unwrap_or_else(|error| panic!("{error}"))
+fn find(name: &str) -> Scenario {
+    scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn plan(mdp: &BeliefMdp) -> GridPolicy {
@@ -23,7 +24,7 @@ fn plan(mdp: &BeliefMdp) -> GridPolicy {
 /// The unbounded maze, planned once for all tests.
 fn unbounded() -> &'static GridPolicy {
     static PLAN: OnceLock<GridPolicy> = OnceLock::new();
-    PLAN.get_or_init(|| plan(&BeliefMdp::new(&find("maze-2d-unbounded"))))
+    PLAN.get_or_init(|| plan(&BeliefMdp::new(&find("maze-2d-unbounded").model)))
 }
 
 fn automaton(mdp: &BeliefMdp, policy: &GridPolicy, episodes: usize) -> Automaton {
@@ -35,10 +36,10 @@ fn automaton(mdp: &BeliefMdp, policy: &GridPolicy, episodes: usize) -> Automaton
 }
 
 /// Way of the true state under a plan of actions.
-fn walk(model: &Model, seed: u64, plan: &[usize]) -> Vec<Vec<f64>> {
-    let mut world = ProblemWorld::new(model);
+fn walk(scenario: &Scenario, seed: u64, plan: &[usize]) -> Vec<Vec<f64>> {
+    let mut world = ProblemWorld::new(scenario);
     let mut draws = Draws::new(seed, 0);
-    let mut observation = vec![0.0; model.observation_dim()];
+    let mut observation = vec![0.0; scenario.model.observation_dim()];
     world.reset(&mut draws);
     let mut way = vec![world.state().to_vec()];
     for &action in plan {
@@ -51,11 +52,11 @@ fn walk(model: &Model, seed: u64, plan: &[usize]) -> Vec<Vec<f64>> {
 #[test]
 fn the_true_state_is_never_inside_a_wall_and_never_goes_through_one() {
     for name in ["n-maze", "u-maze", "maze-2d"] {
-        let model = find(name);
-        let map = model.map.clone().unwrap();
+        let scenario = find(name);
+        let map = scenario.model.map.clone().unwrap();
         for seed in 0..200 {
             let plan: Vec<usize> = (0..40).map(|t| (t / 5 + seed as usize) % 4).collect();
-            let way = walk(&model, seed, &plan);
+            let way = walk(&scenario, seed, &plan);
             for step in way.windows(2) {
                 let (from, to) = ([step[0][0], step[0][1]], [step[1][0], step[1][1]]);
                 assert!(map.free(to), "{name}, seed {seed}: {to:?}");
@@ -71,21 +72,23 @@ fn the_true_state_is_never_inside_a_wall_and_never_goes_through_one() {
 
 #[test]
 fn a_start_is_drawn_on_its_own_side_of_a_thin_wall() {
-    let text = model::builtin("maze-2d").unwrap();
+    let text = scenario::builtin("maze-2d").unwrap();
     let drawing = "+--+--+\n|  |  |\n+  +  +\n|  | *|\n+--+--+\n";
     let text = text
         .replace("....\n....\n....\n...*\n", drawing)
         .replace("[0.0, 4.0]", "[0.5, 1.0]");
-    let model = model::read(&text, "thin.toml").unwrap_or_else(|error| panic!("{error}"));
+    let scenario = scenario::read(&text, "thin.toml").unwrap_or_else(|error| panic!("{error}"));
     // With a standard deviation of 2.2 almost half of all starts would lie beyond the wall at x = 1.
-    let starts: Vec<f64> = (0..200).map(|seed| walk(&model, seed, &[])[0][0]).collect();
+    let starts: Vec<f64> = (0..200)
+        .map(|seed| walk(&scenario, seed, &[])[0][0])
+        .collect();
     assert!(starts.iter().all(|&x| x < 1.0), "{starts:?}");
     assert!(starts.iter().any(|&x| x > 0.999));
 }
 
 #[test]
 fn a_belief_that_knows_the_map_stays_where_a_state_can_be() {
-    let model = find("u-maze");
+    let model = find("u-maze").model;
     let map = model.map.clone().unwrap();
     let mdp = BeliefMdp::new(&model);
     let filter = mdp.filter();
@@ -102,7 +105,7 @@ fn a_belief_that_knows_the_map_stays_where_a_state_can_be() {
 
 #[test]
 fn the_prediction_of_such_a_belief_stops_at_a_wall() {
-    let mdp = BeliefMdp::new(&find("u-maze"));
+    let mdp = BeliefMdp::new(&find("u-maze").model);
     let model = mdp.model();
     let east = model.action_named("EAST").unwrap();
     let belief = Belief {
@@ -122,7 +125,7 @@ fn the_prediction_of_such_a_belief_stops_at_a_wall() {
 
 #[test]
 fn a_belief_that_knows_walls_expects_nobody_inside_them() {
-    let model = find("u-maze");
+    let model = find("u-maze").model;
     let knows = BeliefMdp::new(&model);
     let plain = BeliefMdp::new(&model.clone().with_walls(WallBelief::Ignore));
     let map = model.map.as_ref().unwrap();
@@ -151,9 +154,10 @@ fn in_the_corridor_knowing_the_walls_is_worth_a_quarter_more() {
         seed: 1,
     };
     let earned = |name: &str| {
-        let mdp = BeliefMdp::new(&find(name));
+        let scenario = find(name);
+        let mdp = BeliefMdp::new(&scenario.model);
         let policy = automaton(&mdp, &plan(&mdp), 300);
-        evaluate(mdp.model(), &policy.filter, &policy, options, &Silent).discounted
+        evaluate(&scenario, &policy.filter, &policy, options, &Silent).discounted
     };
     let (knows, plain) = (earned("corridor-walls"), earned("corridor"));
     assert!(
@@ -168,7 +172,7 @@ fn in_the_corridor_knowing_the_walls_is_worth_a_quarter_more() {
 
 #[test]
 fn corridor_walls_is_the_corridor_with_another_belief() {
-    let (walls, corridor) = (find("corridor-walls"), find("corridor"));
+    let (walls, corridor) = (find("corridor-walls").model, find("corridor").model);
     let same = corridor.with_walls(WallBelief::Clip);
     assert_eq!(walls.fingerprint(), same.fingerprint());
 }
@@ -197,8 +201,9 @@ fn the_unbounded_maze_has_three_levels_and_its_known_value() {
 
 #[test]
 fn the_hidden_load_is_carried_in_the_shortest_cycle() {
-    let model = find("load-unload");
-    let mdp = BeliefMdp::new(&model);
+    let scenario = find("load-unload");
+    let model = &scenario.model;
+    let mdp = BeliefMdp::new(model);
     let policy = automaton(&mdp, &plan(&mdp), 300);
     // Two memories, in each one action on the way and one at the end: nothing can go.
     assert_eq!(policy.nodes.len(), 4, "{:#?}", policy.nodes);
@@ -218,7 +223,7 @@ fn the_hidden_load_is_carried_in_the_shortest_cycle() {
         episodes: 1,
         seed: 1,
     };
-    let earned = evaluate(&model, &policy.filter, &policy, options, &Silent);
+    let earned = evaluate(&scenario, &policy.filter, &policy, options, &Silent);
     assert_eq!(
         earned.undiscounted.mean, 20.0,
         "two rewards in every ten of 100 steps"

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use pilotage::model;
+use pilotage::scenario;
 use serde_json::Value;
 
 /// Set to write the schema instead of comparing it.
@@ -12,7 +12,7 @@ const UPDATE: &str = "PILOTAGE_UPDATE_SCHEMA";
 #[test]
 fn the_committed_schema_is_current() {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../models/model.schema.json");
-    let current = model::schema();
+    let current = scenario::schema();
     if std::env::var_os(UPDATE).is_some() {
         std::fs::write(
             &path,
@@ -69,9 +69,9 @@ fn keys_of_file(table: &toml::Table, keys: &mut Vec<String>) {
 #[test]
 fn every_key_of_every_model_is_in_the_schema() {
     let mut known = Vec::new();
-    keys_of_schema(model::schema().as_value(), &mut known);
-    for name in model::names() {
-        let table: toml::Table = model::builtin(name).unwrap().parse().unwrap();
+    keys_of_schema(scenario::schema().as_value(), &mut known);
+    for name in scenario::names() {
+        let table: toml::Table = scenario::builtin(name).unwrap().parse().unwrap();
         let mut used = Vec::new();
         keys_of_file(&table, &mut used);
         let missing: Vec<_> = used.iter().filter(|key| !known.contains(key)).collect();
@@ -96,15 +96,15 @@ fn every_key_is_documented() {
             _ => {}
         }
     }
-    check(model::schema().as_value());
+    check(scenario::schema().as_value());
 }
 
 #[test]
 fn the_schema_knows_every_key_that_the_reader_knows() {
     let mut keys = Vec::new();
-    keys_of_schema(model::schema().as_value(), &mut keys);
+    keys_of_schema(scenario::schema().as_value(), &mut keys);
     let text = "format = 1\nzzzzzzzzzzzzzzzz = 1";
-    let error = model::read(text, "x.toml").map(|_| ()).unwrap_err();
+    let error = scenario::read(text, "x.toml").map(|_| ()).unwrap_err();
     let known: Vec<&str> = error.hint.split('`').skip(1).step_by(2).collect();
     assert_eq!(known.len(), 16, "{known:?}");
     assert!(

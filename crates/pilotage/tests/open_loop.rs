@@ -3,12 +3,13 @@
 
 mod common;
 
-use common::built_in;
+use common::{built_in, scenario};
 use nalgebra::DMatrix;
 use pilotage::belief::gaussian::interval_probability;
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::model::{Interval, Model, Region, Then};
 use pilotage::observe::Silent;
+use pilotage::scenario::Scenario;
 use pilotage::simulate::{Estimate, Options, evaluate};
 use pilotage::solve::kbvi::branches::{Branches, Settings};
 use pilotage::solve::kbvi::formulas::{Formulas, Outlook, RewardFormula, SpreadFormula};
@@ -294,19 +295,19 @@ fn the_worth_of_a_sequence_does_not_depend_on_the_sensor() {
     assert!(off.abs() > 1e-3, "{off}");
 }
 
-fn replanning_earns(model: &Model, horizon: usize, episodes: usize) -> Estimate {
-    let mdp = BeliefMdp::new(model);
+fn replanning_earns(scenario: &Scenario, horizon: usize, episodes: usize) -> Estimate {
+    let mdp = BeliefMdp::new(&scenario.model);
     let planner = search(&mdp, horizon, Formulas::default());
     let options = Options { episodes, seed: 7 };
-    evaluate(model, &mdp.filter(), &planner, options, &Silent).discounted
+    evaluate(scenario, &mdp.filter(), &planner, options, &Silent).discounted
 }
 
 /// Replanning with fixed sequences earns less than the best there is, 2.6876, which waits until it is sure enough. The difference is
 /// more than three standard errors: a correct program fails for 0.1% of seeds.
 #[test]
 fn replanning_declares_too_early() {
-    let model = built_in("corridor-declare");
-    let earned = replanning_earns(&model, 3, 10_000);
+    let scenario = scenario("corridor-declare");
+    let earned = replanning_earns(&scenario, 3, 10_000);
     assert!(earned.mean + 3.0 * earned.stderr < 2.6876, "{earned:?}");
     // It does find the goal, and hits more often than it misses.
     assert!(earned.mean > 1.0, "{earned:?}");
@@ -316,13 +317,13 @@ fn replanning_declares_too_early() {
 /// taken. That EAST stands first is all that leads this agent to the goal; where WEST does, it walks away and never declares.
 #[test]
 fn replanning_depends_on_the_order_of_actions() {
-    let mut model = built_in("corridor-declare");
-    let mdp = BeliefMdp::new(&model);
+    let mut scenario = scenario("corridor-declare");
+    let mdp = BeliefMdp::new(&scenario.model);
     let q = search(&mdp, 3, Formulas::default()).q_values(mdp.start());
     assert_eq!(q[0], q[1]);
     assert_eq!(q[0], q[2]);
-    model.actions.swap(0, 1);
-    let earned = replanning_earns(&model, 3, 300);
+    scenario.model.actions.swap(0, 1);
+    let earned = replanning_earns(&scenario, 3, 300);
     assert!(earned.mean < 1.0, "{earned:?}");
 }
 

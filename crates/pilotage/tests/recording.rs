@@ -1,10 +1,10 @@
 //! Recorded episodes are the runs that a simulation makes.
 
 use pilotage::belief::BeliefMdp;
-use pilotage::model;
 use pilotage::observe::Silent;
 use pilotage::policy::Controller;
 use pilotage::report::{Recording, Take, record};
+use pilotage::scenario::{self, Scenario, Truth};
 use pilotage::simulate::{Agent, FilterAgent, run_episode, wake_up};
 use pilotage::solve::{SolveSettings, SolverKind, solve};
 use pilotage::world::{Draws, ProblemWorld};
@@ -14,10 +14,11 @@ const SEED: u64 = 3;
 /// Rewards, actions and true states of an episode as a simulation has them.
 type Steps = Vec<(f64, String, Vec<f64>)>;
 
-fn simulated(model: &model::Model, agent: &mut dyn Agent, episode: u64) -> Steps {
+fn simulated(scenario: &Scenario, agent: &mut dyn Agent, episode: u64) -> Steps {
+    let model = &scenario.model;
     let mut steps = Vec::new();
     run_episode(
-        &mut ProblemWorld::new(model),
+        &mut ProblemWorld::new(scenario),
         agent,
         &mut Draws::new(SEED, episode),
         &mut vec![0.0; model.observation_dim()],
@@ -43,12 +44,13 @@ fn recorded(recording: &Recording) -> Steps {
 #[test]
 fn recordings_are_the_runs_of_a_simulation() {
     for name in ["corridor", "load-unload", "u-maze"] {
-        let mdp = BeliefMdp::new(&model::find(name).expect("a built-in model"));
+        let scenario = scenario::find(name).expect("a built-in model");
+        let mdp = BeliefMdp::new(&scenario.model);
         let settings = SolveSettings {
             points: Some(41),
             ..SolveSettings::default()
         };
-        let solution = solve(SolverKind::KbviClosed, mdp.model(), &settings, &Silent)
+        let solution = solve(SolverKind::KbviClosed, &scenario, &settings, &Silent)
             .expect("a model it accepts");
         let automaton = solution.automaton().expect("the default form");
         let controller = Controller::new(automaton);
@@ -62,10 +64,10 @@ fn recordings_are_the_runs_of_a_simulation() {
                     defaults.choice,
                 )
                 .expect("several starts");
-                simulated(mdp.model(), &mut agent, episode)
+                simulated(&scenario, &mut agent, episode)
             } else {
                 let mut agent = FilterAgent::new(&automaton.filter, &controller);
-                simulated(mdp.model(), &mut agent, episode)
+                simulated(&scenario, &mut agent, episode)
             };
             for most_steps in [7, usize::MAX] {
                 let take = Take {
@@ -73,7 +75,8 @@ fn recordings_are_the_runs_of_a_simulation() {
                     episode,
                     most_steps,
                 };
-                let recording = record(&mdp, automaton, take).expect("one or two variables");
+                let recording =
+                    record(&mdp, &scenario.truth, automaton, take).expect("one or two variables");
                 assert_eq!(
                     recorded(&recording),
                     whole[..whole.len().min(most_steps)],
@@ -108,7 +111,7 @@ fn assert_sound(recording: &Recording) {
 
 #[test]
 fn a_model_with_more_than_two_variables_is_refused() {
-    let mdp = BeliefMdp::new(&model::find("cart-pole").expect("a built-in model"));
+    let mdp = BeliefMdp::new(&scenario::find("cart-pole").expect("a built-in model").model);
     let nothing =
         pilotage::policy::Automaton::new(&mdp, "none", pilotage::policy::Matching::Nearest);
     let take = Take {
@@ -116,7 +119,7 @@ fn a_model_with_more_than_two_variables_is_refused() {
         episode: 0,
         most_steps: 1,
     };
-    let error = record(&mdp, &nothing, take).expect_err("four variables");
+    let error = record(&mdp, &Truth::default(), &nothing, take).expect_err("four variables");
     assert!(error.to_string().contains("4 state variables"), "{error}");
 }
 

@@ -2,36 +2,36 @@
 #![allow(clippy::unwrap_used)]
 
 use pilotage::Error;
-use pilotage::model::{self, Model, Walls, WorldKind, WorldSpec};
+use pilotage::model::Model;
 use pilotage::observe::Silent;
 use pilotage::policy::Controller;
+use pilotage::scenario::{self, Scenario, Simulator, Walls};
 use pilotage::simulate::{Options, evaluate};
 use pilotage::solve::kafaq::{Settings, learn};
 use pilotage::world::{Draws, ProblemWorld, World};
 
 const PROBLEMS: [&str; 3] = ["basic", "maze-4x4", "cart-load-unload"];
 
-fn model(name: &str) -> Model {
-    model::find(name).unwrap_or_else(|error| panic!("{error}"))
+fn scenario(name: &str) -> Scenario {
+    scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn robot_of(name: &str) -> Model {
-    model(&format!("robot-{name}"))
+fn robot_of(name: &str) -> Scenario {
+    scenario(&format!("robot-{name}"))
 }
 
 #[test]
 fn a_robot_file_is_its_problem_in_another_world() {
     for name in PROBLEMS {
-        let (plain, robot) = (model(name), robot_of(name));
-        assert!(matches!(robot.world.kind, WorldKind::Robot(_)));
-        let stripped = |model: &Model| Model {
+        let (plain, robot) = (scenario(name), robot_of(name));
+        assert!(matches!(robot.truth.simulator, Simulator::Robot(_)));
+        let stripped = |scenario: &Scenario| Model {
             name: String::new(),
             about: String::new(),
-            world: WorldSpec::default(),
-            ..model.clone()
+            ..scenario.model.clone()
         };
         assert_eq!(stripped(&plain), stripped(&robot), "{name}");
-        assert_eq!(plain.world.walls, Walls::Clamp);
+        assert_eq!(plain.truth.walls, Walls::Clamp);
     }
 }
 
@@ -54,7 +54,10 @@ fn the_robot_senses_as_well_as_the_agent_assumes() {
             }
         }
     }
-    let (sd, assumed) = ((square / count).sqrt(), robot.sensor.noise[(0, 0)].sqrt());
+    let (sd, assumed) = (
+        (square / count).sqrt(),
+        robot.model.sensor.noise[(0, 0)].sqrt(),
+    );
     assert!((sd / assumed - 1.0).abs() < 0.1, "{sd} against {assumed}");
 }
 
@@ -65,12 +68,12 @@ fn what_was_learned_elsewhere_earns_its_return_on_the_robot() {
         seed: 11,
     };
     for name in PROBLEMS {
-        let (plain, robot) = (model(name), robot_of(name));
+        let (plain, robot) = (scenario(name), robot_of(name));
         let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&plain)) };
-        let learned = learn(&plain, &worlds, &Settings::default(), None, &Silent).unwrap();
+        let learned = learn(&plain.model, &worlds, &Settings::default(), None, &Silent).unwrap();
         let automaton = &learned.automaton;
-        automaton.check_problem(&plain, "policy").unwrap();
-        automaton.check_world(&robot, "policy").unwrap();
+        automaton.check_problem(&plain.model, "policy").unwrap();
+        automaton.check_world(&robot.model, "policy").unwrap();
         let controller = Controller::new(automaton);
         let [there, here] = [&plain, &robot]
             .map(|world| evaluate(world, &automaton.filter, &controller, options, &Silent));
@@ -84,9 +87,9 @@ fn what_was_learned_elsewhere_earns_its_return_on_the_robot() {
 
 #[test]
 fn a_policy_is_refused_a_world_that_it_has_no_actions_or_sensors_for() {
-    let plain = model("basic");
+    let plain = scenario("basic");
     let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&plain)) };
-    let automaton = learn(&plain, &worlds, &Settings::default(), None, &Silent)
+    let automaton = learn(&plain.model, &worlds, &Settings::default(), None, &Silent)
         .unwrap()
         .automaton;
     let refused = |world: &Model| {
@@ -94,11 +97,11 @@ fn a_policy_is_refused_a_world_that_it_has_no_actions_or_sensors_for() {
         assert!(matches!(error, Error::Policy { .. }), "{error}");
         error.to_string()
     };
-    assert!(refused(&robot_of("maze-4x4")).contains("actions EAST, WEST"));
-    let mut renamed = plain.clone();
+    assert!(refused(&robot_of("maze-4x4").model).contains("actions EAST, WEST"));
+    let mut renamed = plain.model.clone();
     renamed.state[0].name = "place".to_owned();
     assert!(refused(&renamed).contains("state variables x"));
-    let mut blind = plain.clone();
+    let mut blind = plain.model.clone();
     blind.sensor.h = nalgebra::DMatrix::from_row_slice(2, 1, &[1.0, 1.0]);
     assert!(refused(&blind).contains("2 readings"));
 }

@@ -4,15 +4,20 @@
 use std::sync::OnceLock;
 
 use pilotage::belief::{Belief, BeliefMdp, Merge, Tracker, Tracking};
-use pilotage::model::{self, ActionId};
+use pilotage::model::ActionId;
 use pilotage::observe::Silent;
 use pilotage::policy::Policy;
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Agent;
 use pilotage::simulate::wake_up::{Choice, Settings, WakeUp, WakeUpAgent, measure};
 use pilotage::solve::kbvi::closed::{self, GridPolicy};
 
+fn scenario(name: &str) -> Scenario {
+    scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
+}
+
 fn mdp(name: &str) -> BeliefMdp {
-    BeliefMdp::new(&model::find(name).unwrap_or_else(|error| panic!("{error}")))
+    BeliefMdp::new(&scenario(name).model)
 }
 
 /// The mazes, planned once for all tests.
@@ -156,14 +161,15 @@ fn the_agent_first_believes_the_farthest_start_and_then_the_heaviest() {
 }
 
 fn wake_up(name: &str, choice: Choice, tracking: Tracking) -> WakeUp {
-    let mdp = mdp(name);
+    let scenario = scenario(name);
+    let mdp = BeliefMdp::new(&scenario.model);
     let settings = Settings {
         choice,
         tracking,
         episodes: 1500,
         seed: 3,
     };
-    measure(&mdp, plan(name), &settings, &Silent).unwrap()
+    measure(&mdp, &scenario.truth, plan(name), &settings, &Silent).unwrap()
 }
 
 /// 1,500 pairs give the ratio a standard error near 0.006; over 10,000 it is 1.00 in the n and 1.007 in the U, so that 0.95 is missed
@@ -230,7 +236,7 @@ fn only_what_can_be_woken_up_is() {
         episodes: 0,
         ..Settings::default()
     };
-    let error = measure(&maze, &Always(0), &none, &Silent)
+    let error = measure(&maze, &scenario("n-maze").truth, &Always(0), &none, &Silent)
         .map(drop)
         .unwrap_err();
     assert!(error.to_string().contains("episodes = 0"), "{error}");

@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 use pilotage::belief::BeliefMdp;
-use pilotage::model::{Model, WorldKind};
 use pilotage::observe::Silent;
 use pilotage::policy::Controller;
 use pilotage::report::{Finding, Series, Verdict, returns_svg, values_svg};
+use pilotage::scenario::{Scenario, Simulator};
 use pilotage::simulate::{Evaluation, LifeOptions, life};
 use pilotage::solve::arkaq::{self, Learned};
 use pilotage::solve::{Learning, compile};
@@ -18,8 +18,8 @@ use crate::failure::Failure;
 
 /// Table 3.1 and the linearised pole.
 pub fn table_3_1(_: &Context<'_>) -> Result<Finding, Failure> {
-    let model = problem("cart-pole")?;
-    let WorldKind::CartPole(plant) = &model.world.kind else {
+    let scenario = problem("cart-pole")?;
+    let Simulator::CartPole(plant) = &scenario.truth.simulator else {
         return Err(Failure::Usage("cart-pole has no pole".to_owned()));
     };
     let (f, g) = plant.linearised();
@@ -109,12 +109,12 @@ struct Run {
     earned: Evaluation,
 }
 
-fn learn(model: &Model, settings: arkaq::Settings) -> Result<Learned, Failure> {
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
-    let mut learned = arkaq::learn(model, &worlds, &settings, None, &Silent)?;
+fn learn(scenario: &Scenario, settings: arkaq::Settings) -> Result<Learned, Failure> {
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(scenario)) };
+    let mut learned = arkaq::learn(&scenario.model, &worlds, &settings, None, &Silent)?;
     compile::annotate(
         &mut learned.automaton,
-        &BeliefMdp::new(model),
+        &BeliefMdp::new(&scenario.model),
         200,
         settings.seed,
     );
@@ -149,7 +149,7 @@ fn remembering(vigilance: f64, seed: u64) -> arkaq::Settings {
 
 fn runs(
     context: &Context<'_>,
-    model: &Model,
+    scenario: &Scenario,
     settings: &(dyn Fn(u64) -> arkaq::Settings + Sync),
 ) -> Result<Vec<Run>, Failure> {
     seeds(context)
@@ -157,8 +157,8 @@ fn runs(
         .map(|seed| {
             let settings = settings(seed);
             let depth = settings.depth;
-            let learned = learn(model, settings)?;
-            let earned = earned(model, &learned.automaton, evaluation(context));
+            let learned = learn(scenario, settings)?;
+            let earned = earned(scenario, &learned.automaton, evaluation(context));
             Ok(Run {
                 depth,
                 learned,
@@ -182,8 +182,8 @@ struct Problem {
 }
 
 fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> {
-    let model = problem(one.model)?;
-    let best = yardstick(context, &model)?;
+    let scenario = problem(one.model)?;
+    let best = yardstick(context, &scenario)?;
     let mut draft = Draft::new(one.title, one.thesis);
     let mut rows = Vec::new();
     let mut highest = f64::NEG_INFINITY;
@@ -220,7 +220,7 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
         medians
     };
     for &vigilance in vigilances {
-        let found = runs(context, &model, &|seed| at(vigilance, seed))?;
+        let found = runs(context, &scenario, &|seed| at(vigilance, seed))?;
         let [of_clusters, of_nodes, share] = row(vigilance.to_string(), &found);
         clusters.push((vigilance, of_clusters));
         nodes.push((vigilance, of_nodes));
@@ -241,7 +241,7 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
         }
     }
     for &vigilance in one.remembering {
-        let found = runs(context, &model, &|seed| remembering(vigilance, seed))?;
+        let found = runs(context, &scenario, &|seed| remembering(vigilance, seed))?;
         row(vigilance.to_string(), &found);
         if context.quick {
             continue;
@@ -250,7 +250,7 @@ fn reproduced(context: &Context<'_>, one: &Problem) -> Result<Finding, Failure> 
             merge: true,
             ..remembering(vigilance, seed)
         };
-        let found = runs(context, &model, &merging)?;
+        let found = runs(context, &scenario, &merging)?;
         row(format!("{vigilance}, merged"), &found);
         if let Some(first) = found.first() {
             let automaton = &first.learned.automaton;
@@ -385,7 +385,7 @@ pub fn figure_3_15(context: &Context<'_>) -> Result<Finding, Failure> {
 
 /// The pole (3.4.8).
 pub fn section_3_4_8(context: &Context<'_>) -> Result<Finding, Failure> {
-    let model = problem("cart-pole-sd")?;
+    let scenario = problem("cart-pole-sd")?;
     let steps = context.either(100_000, 10_000);
     let mut rows = Vec::new();
     let mut all_capped = true;
@@ -394,14 +394,20 @@ pub fn section_3_4_8(context: &Context<'_>) -> Result<Finding, Failure> {
         let lives = seeds(context)
             .into_par_iter()
             .map(|seed| {
-                let learned = learn(&model, at(vigilance, seed))?;
+                let learned = learn(&scenario, at(vigilance, seed))?;
                 let options = LifeOptions {
                     runs: 1,
                     steps,
                     seed: context.seed + 998 + seed,
                 };
                 let policy = Controller::new(&learned.automaton);
-                let lived = life(&model, &learned.automaton.filter, &policy, options, &Silent);
+                let lived = life(
+                    &scenario,
+                    &learned.automaton.filter,
+                    &policy,
+                    options,
+                    &Silent,
+                );
                 Ok((
                     learned,
                     lived.steps() as f64 / lived.failures().max(1) as f64,
@@ -455,10 +461,10 @@ pub fn figure_6_2(context: &Context<'_>) -> Result<Finding, Failure> {
         ("cart-load-unload", 0.5, at),
         ("shuttle", 0.5, remembering),
     ] {
-        let model = problem(name)?;
-        let best = yardstick(context, &model)?;
+        let scenario = problem(name)?;
+        let best = yardstick(context, &scenario)?;
         let share = |earned: &Evaluation| 100.0 * earned.discounted.mean / best.discounted.mean;
-        let other = super::learning::runs(context, &model)?;
+        let other = super::learning::runs(context, &scenario)?;
         let kafaq_nodes = median_of(
             other
                 .iter()
@@ -493,7 +499,7 @@ pub fn figure_6_2(context: &Context<'_>) -> Result<Finding, Failure> {
                 merge,
                 ..learner(vigilance, seed)
             };
-            let found = runs(context, &model, &settings)?;
+            let found = runs(context, &scenario, &settings)?;
             let depth = depth_of(&found);
             let of =
                 |value: &dyn Fn(&Run) -> f64| -> Vec<f64> { found.iter().map(value).collect() };

@@ -16,7 +16,7 @@ pub fn table_4_1(_: &Context<'_>) -> Result<Finding, Failure> {
     let mut same = true;
     for (start, printed) in TABLE_4_1 {
         // Q = R = 0.5, A = H = 1.
-        let mut model = problem("corridor-unbounded")?;
+        let mut model = problem("corridor-unbounded")?.model;
         model.start[0].covariance[(0, 0)] = start;
         model.motion.noise.fill(0.5);
         model.sensor.noise.fill(0.5);

@@ -3,11 +3,12 @@
 use nalgebra::DMatrix;
 use pilotage::belief::BeliefMdp;
 use pilotage::belief::gaussian::interval_probability;
-use pilotage::model::{Interval, Model};
+use pilotage::model::Interval;
 use pilotage::observe::Silent;
 use pilotage::policy::{Matching, Policy};
 use pilotage::random::{Role, normal, stream};
 use pilotage::report::{Finding, Series, Verdict};
+use pilotage::scenario::Scenario;
 use pilotage::solve::kbvi::branches::{self, Branches};
 use pilotage::solve::kbvi::formulas::{
     Formulas, Outlook, RewardFormula, SpreadFormula, ramp_lines,
@@ -75,7 +76,7 @@ pub fn figure_5_2(_: &Context<'_>) -> Result<Finding, Failure> {
 
 /// Where the mean may be after a step.
 pub fn figures_5_3_and_5_4(context: &Context<'_>) -> Result<Finding, Failure> {
-    let model = problem("corridor-unbounded")?;
+    let model = problem("corridor-unbounded")?.model;
     let mdp = BeliefMdp::new(&model);
     let start = mdp.start().clone();
     let east = 0;
@@ -165,7 +166,7 @@ pub fn figures_5_3_and_5_4(context: &Context<'_>) -> Result<Finding, Failure> {
 
 /// The levels.
 pub fn figure_5_6(_: &Context<'_>) -> Result<Finding, Failure> {
-    let model = problem("corridor")?;
+    let model = problem("corridor")?.model;
     let mdp = BeliefMdp::new(&model);
     let levels = mdp.levels();
     let variances: Vec<f64> = (0..levels.len())
@@ -217,7 +218,7 @@ struct Row {
 
 fn thesis_style(
     context: &Context<'_>,
-    model: &Model,
+    scenario: &Scenario,
     form: Form,
     reward: RewardFormula,
 ) -> Result<(Row, pilotage::policy::Automaton), Failure> {
@@ -230,12 +231,12 @@ fn thesis_style(
         horizons: 3..=context.either(20, 13),
         ..SolveSettings::default()
     };
-    let solution = context.solved(SolverKind::Kbvi, model, settings)?;
+    let solution = context.solved(SolverKind::Kbvi, scenario, settings)?;
     let found = automaton(&solution)?.clone();
     let row = Row {
         nodes: found.nodes.len(),
         horizon: solution.policy_convergence_horizon,
-        earned: context.earned(model, &solution),
+        earned: context.earned(scenario, &solution)?,
     };
     Ok((row, found))
 }
@@ -255,11 +256,11 @@ pub fn figures_5_9_and_5_10(context: &Context<'_>) -> Result<Finding, Failure> {
         "1-NN: at least 12 listens before a door, none opened until the variance is below 0.03, convergence horizon 13. Segments: at least 5 listens.",
     );
     for (name, reading) in [("tiger", "variance"), ("tiger-sd", "standard deviation")] {
-        let model = problem(name)?;
-        let mdp = BeliefMdp::new(&model);
+        let scenario = problem(name)?;
+        let mdp = BeliefMdp::new(&scenario.model);
         for form in FORMS {
             for (reward, formula) in REWARDS {
-                let (row, found) = thesis_style(context, &model, form, reward)?;
+                let (row, found) = thesis_style(context, &scenario, form, reward)?;
                 let listens = row.earned.steps.mean - 1.0;
                 if form == Form::Segments && name == "tiger-sd" && reward == RewardFormula::Ramp {
                     listens_of_sd = listens;
@@ -267,7 +268,7 @@ pub fn figures_5_9_and_5_10(context: &Context<'_>) -> Result<Finding, Failure> {
                 if reward == RewardFormula::Ramp && form == Form::Segments {
                     draft = draft.map(
                         format!("Belief segments, ramp formula, 0.625 as a {reading}"),
-                        &model,
+                        &scenario.model,
                         &found,
                     )?;
                 }
@@ -283,8 +284,8 @@ pub fn figures_5_9_and_5_10(context: &Context<'_>) -> Result<Finding, Failure> {
                 ]);
             }
         }
-        let planned = context.planned(&model)?;
-        let earned = context.earned(&model, &planned);
+        let planned = context.planned(&scenario)?;
+        let earned = context.earned(&scenario, &planned)?;
         let found = automaton(&planned)?;
         rows.push([
             reading.to_owned(),
@@ -335,13 +336,13 @@ pub fn figures_5_11_to_5_13(context: &Context<'_>) -> Result<Finding, Failure> {
     );
     let mut rows = Vec::new();
     for name in ["corridor-unbounded", "corridor"] {
-        let model = problem(name)?;
+        let scenario = problem(name)?;
         for form in FORMS {
-            let (row, found) = thesis_style(context, &model, form, RewardFormula::Ramp)?;
+            let (row, found) = thesis_style(context, &scenario, form, RewardFormula::Ramp)?;
             if name == "corridor" {
                 draft = draft.map(
                     format!("Representative beliefs, {}", form.name()),
-                    &model,
+                    &scenario.model,
                     &found,
                 )?;
             }
@@ -354,7 +355,7 @@ pub fn figures_5_11_to_5_13(context: &Context<'_>) -> Result<Finding, Failure> {
                 shown(row.earned.discounted),
             ]);
         }
-        let planned = context.planned(&model)?;
+        let planned = context.planned(&scenario)?;
         let found = automaton(&planned)?;
         rows.push([
             name.to_owned(),
@@ -362,13 +363,13 @@ pub fn figures_5_11_to_5_13(context: &Context<'_>) -> Result<Finding, Failure> {
             "nearest".to_owned(),
             found.nodes.len().to_string(),
             "–".to_owned(),
-            shown(context.earned(&model, &planned).discounted),
+            shown(context.earned(&scenario, &planned)?.discounted),
         ]);
         if name == "corridor" {
             draft = draft.automaton("The compiled automaton: three nodes", found)?;
         }
     }
-    let model = problem("corridor-unbounded")?;
+    let model = problem("corridor-unbounded")?.model;
     let mdp = BeliefMdp::new(&model);
     let horizons = 1..=context.either(30, 12);
     let east = horizons.clone().all(|horizon| {
@@ -399,10 +400,10 @@ pub fn figures_5_11_to_5_13(context: &Context<'_>) -> Result<Finding, Failure> {
 
 /// The two-dimensional maze (5.5.3).
 pub fn section_5_5_3(context: &Context<'_>) -> Result<Finding, Failure> {
-    let model = problem("maze-2d-unbounded")?;
+    let scenario = problem("maze-2d-unbounded")?;
     let solution = context.solved(
         SolverKind::KbviClosed,
-        &model,
+        &scenario,
         SolveSettings {
             points: context.quick.then_some(41),
             runs: context.quick.then_some(40),
@@ -410,7 +411,7 @@ pub fn section_5_5_3(context: &Context<'_>) -> Result<Finding, Failure> {
         },
     )?;
     let found = automaton(&solution)?;
-    let earned = context.earned(&model, &solution);
+    let earned = context.earned(&scenario, &solution)?;
     let names: Vec<&str> = found
         .actions
         .iter()
@@ -440,7 +441,7 @@ pub fn section_5_5_3(context: &Context<'_>) -> Result<Finding, Failure> {
         "Section 5.5.3: the two-dimensional maze",
         "Three uncertainty levels with 1, 6 and 11 segments; only SOUTH and EAST are ever favoured; convergence horizon 6.",
     )
-    .map("What to do at which mean, by level", &model, found)?
+    .map("What to do at which mean, by level", &scenario.model, found)?
     .table("Nodes by level", ["level", "nodes"], by_level)
     .table(
         "Value",
@@ -462,10 +463,10 @@ pub fn section_5_5_3(context: &Context<'_>) -> Result<Finding, Failure> {
 
 /// The hidden load.
 pub fn figure_5_14(context: &Context<'_>) -> Result<Finding, Failure> {
-    let model = problem("load-unload")?;
-    let solution = context.planned(&model)?;
+    let scenario = problem("load-unload")?;
+    let solution = context.planned(&scenario)?;
     let found = automaton(&solution)?;
-    let earned = context.earned(&model, &solution);
+    let earned = context.earned(&scenario, &solution)?;
     let per_cycle = earned.undiscounted.mean / earned.steps.mean * 10.0;
     Ok(Draft::new(
         "Figure 5.14 (and 2.10, 2.11): the load that no sensor shows",
@@ -490,7 +491,7 @@ pub fn convergence(context: &Context<'_>) -> Result<Finding, Failure> {
     let mut series = Vec::new();
     let mut rows = Vec::new();
     for (name, claimed) in [("tiger", 13), ("tiger-sd", 13), ("corridor", 5)] {
-        let mdp = BeliefMdp::new(&problem(name)?);
+        let mdp = BeliefMdp::new(&problem(name)?.model);
         for matching in [Matching::Segments, Matching::Nearest] {
             let settings = generate::Settings {
                 matching,
@@ -534,7 +535,7 @@ pub fn convergence(context: &Context<'_>) -> Result<Finding, Failure> {
 
 /// Value of information: what open-loop planning cannot see.
 pub fn declare(context: &Context<'_>) -> Result<Finding, Failure> {
-    let model = problem("corridor-declare")?;
+    let scenario = problem("corridor-declare")?;
     let mut rows = Vec::new();
     let mut earned = Vec::new();
     for solver in [
@@ -547,8 +548,8 @@ pub fn declare(context: &Context<'_>) -> Result<Finding, Failure> {
             horizons: 3..=context.either(20, 12),
             ..SolveSettings::default()
         };
-        let solution = context.solved(solver, &model, settings)?;
-        let found = context.earned(&model, &solution);
+        let solution = context.solved(solver, &scenario, settings)?;
+        let found = context.earned(&scenario, &solution)?;
         rows.push([
             solver.name().to_owned(),
             or_dash(solution.planned_value.map(|value| format!("{value:.4}"))),

@@ -40,7 +40,7 @@ pub fn table_6_1(context: &Context<'_>) -> Result<Finding, Failure> {
     let mut gap = f64::NEG_INFINITY;
     for (row, form, value, models) in TABLE_6_1 {
         for name in models {
-            let model = problem(name)?;
+            let scenario = problem(name)?;
             for (label, formulas) in [
                 ("corrected", Formulas::default()),
                 ("ramp", ramp),
@@ -52,8 +52,8 @@ pub fn table_6_1(context: &Context<'_>) -> Result<Finding, Failure> {
                     horizons: 3..=context.either(20, 10),
                     ..SolveSettings::default()
                 };
-                let solution = context.solved(SolverKind::Kbvi, &model, settings)?;
-                let earned = context.earned(&model, &solution);
+                let solution = context.solved(SolverKind::Kbvi, &scenario, settings)?;
+                let earned = context.earned(&scenario, &solution)?;
                 if name == "tiger" && label == "corrected" {
                     let undiscounted = earned.undiscounted.mean;
                     gap = if form == Form::Segments {
@@ -73,8 +73,8 @@ pub fn table_6_1(context: &Context<'_>) -> Result<Finding, Failure> {
                     format!("{:.3}", earned.undiscounted.mean / earned.steps.mean),
                 ]);
             }
-            let planned = context.planned(&model)?;
-            let earned = context.earned(&model, &planned);
+            let planned = context.planned(&scenario)?;
+            let earned = context.earned(&scenario, &planned)?;
             rows.push([
                 row.to_owned(),
                 "yardstick".to_owned(),

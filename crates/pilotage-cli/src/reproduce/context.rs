@@ -1,12 +1,13 @@
 //! What experiments share: settings of the run, short cuts to solving and measuring, and the making of a finding.
 
 use pilotage::belief::BeliefMdp;
-use pilotage::model::{self, Model};
+use pilotage::model::Model;
 use pilotage::observe::Observer;
 use pilotage::policy::Automaton;
 use pilotage::report::{
     Figure, Finding, Series, Table, Verdict, automaton_svg, belief_map_svg, curves_svg,
 };
+use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options};
 use pilotage::solve::{Solution, SolveSettings, SolverKind, solve};
 
@@ -36,28 +37,28 @@ impl Context<'_> {
     pub fn solved(
         &self,
         solver: SolverKind,
-        model: &Model,
+        scenario: &Scenario,
         settings: SolveSettings,
     ) -> Result<Solution, Failure> {
         let settings = SolveSettings {
             seed: self.seed,
             ..settings
         };
-        Ok(solve(solver, model, &settings, self.observer)?)
+        Ok(solve(solver, scenario, &settings, self.observer)?)
     }
 
     /// The default planner's automaton, which is the yardstick.
-    pub fn planned(&self, model: &Model) -> Result<Solution, Failure> {
-        self.solved(SolverKind::KbviClosed, model, SolveSettings::default())
+    pub fn planned(&self, scenario: &Scenario) -> Result<Solution, Failure> {
+        self.solved(SolverKind::KbviClosed, scenario, SolveSettings::default())
     }
 
-    pub fn earned(&self, model: &Model, solution: &Solution) -> Evaluation {
-        solution.evaluate(model, self.options(), self.observer)
+    pub fn earned(&self, scenario: &Scenario, solution: &Solution) -> Result<Evaluation, Failure> {
+        Ok(solution.evaluate(scenario, self.options(), self.observer)?)
     }
 }
 
-pub fn problem(name: &str) -> Result<Model, Failure> {
-    Ok(model::find(name)?)
+pub fn problem(name: &str) -> Result<Scenario, Failure> {
+    Ok(scenario::find(name)?)
 }
 
 /// The automaton of a solution in the default form.

@@ -1,10 +1,10 @@
 //! Chapters 3, 4 and 6: what the learners find, over many seeds, beside planners that are told map and rewards.
 
 use pilotage::belief::BeliefMdp;
-use pilotage::model::Model;
 use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Controller};
 use pilotage::report::{Finding, Verdict, returns_svg, values_svg};
+use pilotage::scenario::Scenario;
 use pilotage::simulate::{Evaluation, LifeOptions, Options, evaluate, life};
 use pilotage::solve::kafaq::{self, Learned};
 use pilotage::solve::kbvi::closed;
@@ -71,18 +71,23 @@ pub fn seeds(context: &Context<'_>) -> Vec<u64> {
         .collect()
 }
 
-fn learn(model: &Model, seed: u64) -> Result<Learned, Failure> {
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+fn learn(scenario: &Scenario, seed: u64) -> Result<Learned, Failure> {
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(scenario)) };
     let settings = kafaq::Settings {
         seed,
         ..kafaq::Settings::default()
     };
-    let mut learned = kafaq::learn(model, &worlds, &settings, None, &Silent)?;
-    compile::annotate(&mut learned.automaton, &BeliefMdp::new(model), 500, seed);
+    let mut learned = kafaq::learn(&scenario.model, &worlds, &settings, None, &Silent)?;
+    compile::annotate(
+        &mut learned.automaton,
+        &BeliefMdp::new(&scenario.model),
+        500,
+        seed,
+    );
     Ok(learned)
 }
 
-pub fn earned(world: &Model, automaton: &Automaton, options: Options) -> Evaluation {
+pub fn earned(world: &Scenario, automaton: &Automaton, options: Options) -> Evaluation {
     evaluate(
         world,
         &automaton.filter,
@@ -92,12 +97,12 @@ pub fn earned(world: &Model, automaton: &Automaton, options: Options) -> Evaluat
     )
 }
 
-pub fn runs(context: &Context<'_>, model: &Model) -> Result<Vec<Run>, Failure> {
+pub fn runs(context: &Context<'_>, scenario: &Scenario) -> Result<Vec<Run>, Failure> {
     seeds(context)
         .into_par_iter()
         .map(|seed| {
-            let learned = learn(model, seed)?;
-            let earned = earned(model, &learned.automaton, evaluation(context));
+            let learned = learn(scenario, seed)?;
+            let earned = earned(scenario, &learned.automaton, evaluation(context));
             Ok(Run { learned, earned })
         })
         .collect()
@@ -105,32 +110,32 @@ pub fn runs(context: &Context<'_>, model: &Model) -> Result<Vec<Run>, Failure> {
 
 /// The planner that is the yardstick. For a quick look its grid of the plane is coarser: the policy is hardly worse, and it takes a
 /// tenth of the time.
-fn planner(context: &Context<'_>, model: &Model) -> closed::Settings {
+fn planner(context: &Context<'_>, scenario: &Scenario) -> closed::Settings {
     closed::Settings {
-        points: (context.quick && model.state_dim() == 2).then_some(25),
+        points: (context.quick && scenario.model.state_dim() == 2).then_some(25),
         ..closed::Settings::default()
     }
 }
 
 /// What the yardstick of a problem earns.
-pub fn yardstick(context: &Context<'_>, model: &Model) -> Result<Evaluation, Failure> {
+pub fn yardstick(context: &Context<'_>, scenario: &Scenario) -> Result<Evaluation, Failure> {
     let all = yardsticks(
-        model,
-        &planner(context, model),
+        scenario,
+        &planner(context, scenario),
         evaluation(context),
         context.observer,
     )?;
     let first = all.into_iter().next();
     first
         .map(|one| one.earned)
-        .ok_or_else(|| Failure::Usage(format!("{} has no yardstick", model.name)))
+        .ok_or_else(|| Failure::Usage(format!("{} has no yardstick", scenario.model.name)))
 }
 
 fn reproduced(context: &Context<'_>, problem_: &Problem) -> Result<Finding, Failure> {
-    let model = problem(problem_.model)?;
-    let runs = runs(context, &model)?;
-    let planner = planner(context, &model);
-    let told = yardsticks(&model, &planner, evaluation(context), context.observer)?;
+    let scenario = problem(problem_.model)?;
+    let runs = runs(context, &scenario)?;
+    let planner = planner(context, &scenario);
+    let told = yardsticks(&scenario, &planner, evaluation(context), context.observer)?;
     let of = |value: &dyn Fn(&Run) -> f64| -> Vec<f64> { runs.iter().map(value).collect() };
     let best = told
         .first()
@@ -277,19 +282,25 @@ pub fn figure_4_16(context: &Context<'_>) -> Result<Finding, Failure> {
 pub fn section_4_3_6(context: &Context<'_>) -> Result<Finding, Failure> {
     /// A little more than the thesis' four hours of 0.02 s.
     const STEPS: u64 = 750_000;
-    let model = problem("cart-pole-sd")?;
+    let scenario = problem("cart-pole-sd")?;
     let steps = context.either(STEPS, 50_000);
     let lives = seeds(context)
         .into_par_iter()
         .map(|seed| {
-            let learned = learn(&model, seed)?;
+            let learned = learn(&scenario, seed)?;
             let options = LifeOptions {
                 runs: 1,
                 steps,
                 seed: context.seed + 998 + seed,
             };
             let policy = Controller::new(&learned.automaton);
-            let lived = life(&model, &learned.automaton.filter, &policy, options, &Silent);
+            let lived = life(
+                &scenario,
+                &learned.automaton.filter,
+                &policy,
+                options,
+                &Silent,
+            );
             Ok((learned, lived.failures()))
         })
         .collect::<Result<Vec<_>, Failure>>()?;

@@ -22,8 +22,8 @@ pub fn section_5_5_5(context: &Context<'_>) -> Result<Finding, Failure> {
     );
     let models: &[&str] = context.either(&["cart-pole", "cart-pole-noisy"], &["cart-pole"]);
     for &name in models {
-        let model = problem(name)?;
-        let mdp = BeliefMdp::new(&model);
+        let scenario = problem(name)?;
+        let mdp = BeliefMdp::new(&scenario.model);
         let settings = quadratic::Settings {
             effort: context.either(1.0, 0.1),
             seed: context.seed,
@@ -57,7 +57,7 @@ pub fn section_5_5_5(context: &Context<'_>) -> Result<Finding, Failure> {
                 steps,
                 seed: context.seed,
             };
-            let lived = life(&model, &filter, policy, options, context.observer);
+            let lived = life(&scenario, &filter, policy, options, context.observer);
             if name == "cart-pole" && label.starts_with("kbvi-closed") {
                 held = lived.failures() == 0;
             }

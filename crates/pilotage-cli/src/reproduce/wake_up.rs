@@ -25,7 +25,7 @@ const TABLE_5_1: [(usize, &str, [f64; 2], &str); 10] = [
 
 /// The U-shaped maze's policy.
 pub fn table_5_1(context: &Context<'_>) -> Result<Finding, Failure> {
-    let model = problem("u-maze")?;
+    let model = problem("u-maze")?.model;
     let mdp = BeliefMdp::new(&model);
     let policy = closed::solve(&mdp, &closed::Settings::default(), context.observer)?;
     let mut same = 0;
@@ -69,8 +69,8 @@ pub fn figures_5_16_and_5_17(context: &Context<'_>) -> Result<Finding, Failure> 
         "In the N-shaped maze one hypothesis is left after the first step; in the U-shaped maze the agent goes SOUTH first, and hypotheses with weights below 0.05 are dropped.",
     );
     for name in ["n-maze", "u-maze"] {
-        let model = problem(name)?;
-        let mdp = BeliefMdp::new(&model);
+        let scenario = problem(name)?;
+        let mdp = BeliefMdp::new(&scenario.model);
         let policy = closed::solve(&mdp, &closed::Settings::default(), context.observer)?;
         draft = draft.figure(
             format!("{name}: what to do at which mean"),
@@ -103,7 +103,7 @@ pub fn figures_5_16_and_5_17(context: &Context<'_>) -> Result<Finding, Failure> 
                 episodes,
                 seed: context.seed,
             };
-            let found = measure(&mdp, &policy, &settings, context.observer)?;
+            let found = measure(&mdp, &scenario.truth, &policy, &settings, context.observer)?;
             let share = |steps: usize| {
                 let count = found.alone_after.get(steps).copied().unwrap_or(0);
                 format!("{:.1} %", 100.0 * count as f64 / episodes as f64)

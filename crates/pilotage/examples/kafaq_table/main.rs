@@ -13,9 +13,10 @@ mod run;
 
 use std::path::Path;
 
-use pilotage::model::{self, Model};
+use pilotage::model::Model;
 use pilotage::observe::Silent;
 use pilotage::policy::write_whole;
+use pilotage::scenario;
 use pilotage::simulate::Options;
 use pilotage::solve::kbvi::closed;
 use pilotage::solve::yardstick::{Yardstick, yardsticks};
@@ -64,7 +65,7 @@ fn main() {
         .filter(|_| chosen(POLE))
         .map(|seed| {
             eprintln!("{POLE}, seed {seed}");
-            Pole::new(&model::find(POLE).unwrap(), seed)
+            Pole::new(&scenario::find(POLE).unwrap(), seed)
         })
         .collect();
     let text = page::page(&measured, &poles, seeds);
@@ -85,19 +86,20 @@ fn main() {
 }
 
 fn measure(name: &str, seeds: u64) -> Measured {
-    let model = model::find(name).unwrap();
+    let scenario = scenario::find(name).unwrap();
     let robot = ON_ROBOT
         .contains(&name)
-        .then(|| model::find(&format!("robot-{name}")).unwrap());
-    let yardsticks = yardsticks(&model, &closed::Settings::default(), EVALUATION, &Silent).unwrap();
+        .then(|| scenario::find(&format!("robot-{name}")).unwrap());
+    let yardsticks =
+        yardsticks(&scenario, &closed::Settings::default(), EVALUATION, &Silent).unwrap();
     let runs = (1..=seeds)
         .map(|seed| {
             eprintln!("{name}, seed {seed}");
-            Run::new(&model, robot.as_ref(), seed)
+            Run::new(&scenario, robot.as_ref(), seed)
         })
         .collect();
     Measured {
-        model,
+        model: scenario.model,
         yardsticks,
         runs,
     }

@@ -3,9 +3,9 @@
 use std::time::Instant;
 
 use pilotage::belief::BeliefMdp;
-use pilotage::model::Model;
 use pilotage::observe::Silent;
 use pilotage::policy::Controller;
+use pilotage::scenario::Scenario;
 use pilotage::simulate::{Evaluation, LifeOptions, evaluate, life};
 use pilotage::solve::compile;
 use pilotage::solve::kafaq::{self, Learned, Settings};
@@ -30,16 +30,21 @@ pub struct Run {
 
 impl Run {
     /// Learns and evaluates.
-    pub fn new(model: &Model, robot: Option<&Model>, seed: u64) -> Self {
-        let (mut learned, seconds) = learn(model, seed);
-        compile::annotate(&mut learned.automaton, &BeliefMdp::new(model), 500, seed);
+    pub fn new(scenario: &Scenario, robot: Option<&Scenario>, seed: u64) -> Self {
+        let (mut learned, seconds) = learn(scenario, seed);
+        compile::annotate(
+            &mut learned.automaton,
+            &BeliefMdp::new(&scenario.model),
+            500,
+            seed,
+        );
         let automaton = &learned.automaton;
         let controller = Controller::new(automaton);
         let earned =
-            |world: &Model| evaluate(world, &automaton.filter, &controller, EVALUATION, &Silent);
+            |world: &Scenario| evaluate(world, &automaton.filter, &controller, EVALUATION, &Silent);
         Self {
             seed,
-            earned: earned(model),
+            earned: earned(scenario),
             on_robot: robot.map(earned),
             components: automaton.closed_components(),
             learned,
@@ -72,8 +77,8 @@ pub struct Pole {
 
 impl Pole {
     /// Learns, and balances for longer than the thesis' four hours.
-    pub fn new(model: &Model, seed: u64) -> Self {
-        let (learned, seconds) = learn(model, seed);
+    pub fn new(scenario: &Scenario, seed: u64) -> Self {
+        let (learned, seconds) = learn(scenario, seed);
         let options = LifeOptions {
             runs: 1,
             steps: POLE_STEPS,
@@ -81,7 +86,7 @@ impl Pole {
         };
         let controller = Controller::new(&learned.automaton);
         let life = life(
-            model,
+            scenario,
             &learned.automaton.filter,
             &controller,
             options,
@@ -108,13 +113,13 @@ impl Pole {
     }
 }
 
-fn learn(model: &Model, seed: u64) -> (Learned, f64) {
+fn learn(scenario: &Scenario, seed: u64) -> (Learned, f64) {
     let clock = Instant::now();
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(scenario)) };
     let settings = Settings {
         seed,
         ..Settings::default()
     };
-    let learned = kafaq::learn(model, &worlds, &settings, None, &Silent).unwrap();
+    let learned = kafaq::learn(&scenario.model, &worlds, &settings, None, &Silent).unwrap();
     (learned, clock.elapsed().as_secs_f64())
 }

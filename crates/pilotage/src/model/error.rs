@@ -43,7 +43,7 @@ impl Path {
     }
 
     /// Renumbers the items of a list at the top of the file.
-    pub(super) fn renumber(&mut self, list: &str, new_index: &[usize]) {
+    pub(crate) fn renumber(&mut self, list: &str, new_index: &[usize]) {
         if let [Step::Key(key), Step::Index(index), ..] = self.0.as_mut_slice()
             && key == list
             && let Some(&new) = new_index.get(*index)
@@ -100,7 +100,7 @@ impl Fault {
     }
 
     /// The value at `path` names something that is not among the `known`.
-    pub(super) fn unknown<'a>(
+    pub(crate) fn unknown<'a>(
         path: Path,
         kind: &str,
         name: &str,

@@ -7,9 +7,9 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::{Model, WorldSpec};
+use super::Model;
 use crate::digest::Digest;
-use canonical::Canonical;
+pub(crate) use canonical::{Canonical, Fields};
 
 /// Version of the encoding. Another version says nothing about whether two models are the same.
 const VERSION: u32 = 1;
@@ -35,7 +35,8 @@ pub struct Fingerprint {
 }
 
 impl Fingerprint {
-    fn of(fields: &impl Canonical) -> Self {
+    /// The fingerprint of a thing that has canonical bytes.
+    pub(crate) fn of(fields: &impl Canonical) -> Self {
         let mut digest = Digest::new();
         fields.write(&mut digest);
         Self {
@@ -96,13 +97,6 @@ impl<'de> Deserialize<'de> for Fingerprint {
 
 impl Model {
     /// Changes when anything changes that a policy depends on. What is true of the world is no such thing.
-    pub fn fingerprint(&self) -> Fingerprint {
-        Fingerprint::of(self)
-    }
-}
-
-impl WorldSpec {
-    /// Changes when anything changes that is said of the world alone, on which what is *learned* in it depends.
     pub fn fingerprint(&self) -> Fingerprint {
         Fingerprint::of(self)
     }

@@ -5,7 +5,7 @@ mod drawing;
 use serde::{Deserialize, Serialize};
 
 use super::{Interval, Region};
-pub(super) use drawing::draw;
+pub(crate) use drawing::draw;
 
 /// Walls and marked cells of a two-dimensional map, `x` to the east, `y` to the north.
 ///

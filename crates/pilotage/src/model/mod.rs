@@ -1,37 +1,25 @@
 //! What the agent assumes about its world: linear motion and sensing with Gaussian noise, actions,
 //! rewards, hidden modes and the events that change them.
 //!
-//! A [`Model`] is plain data, checked once when it is built ([`Model::validate`]) or read from a TOML
-//! file ([`read`]). What is *true* may differ: see [`WorldSpec`] and the `world` module.
+//! A [`Model`] is plain data, checked once when it is built ([`Model::validate`]) or read from a TOML file
+//! ([`crate::scenario::read`]). What is *true* may differ: that is part of a [`crate::scenario::Scenario`], which no planner sees.
 
 mod barriers;
-mod builtin;
-mod cart_pole;
-mod error;
-mod file;
-mod file_value;
-mod fingerprint;
-mod locate;
-mod map;
-mod read;
+pub(crate) mod error;
+pub(crate) mod fingerprint;
+pub(crate) mod map;
 mod region;
-mod resolve;
-mod robot;
-mod validate;
+pub(crate) mod validate;
 
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use barriers::Barriers;
-pub use builtin::{builtin, find, names};
 pub use error::{Fault, ModelError, Path, Place, Step, suggest};
-pub use file::schema;
 pub use fingerprint::{Fingerprint, NotAFingerprint};
 pub use map::Map;
-pub use read::{load, read};
 pub use region::{Interval, Region};
-pub use robot::Robot;
 
 /// Index into [`Model::actions`].
 pub type ActionId = usize;
@@ -76,8 +64,6 @@ pub struct Model {
     pub belief: BeliefSettings,
     /// Walls and marked cells of a grid map, known to the agent's planner.
     pub map: Option<Map>,
-    /// What is true where it differs from the above.
-    pub world: WorldSpec,
 }
 
 /// One component of the state.
@@ -289,84 +275,6 @@ pub enum HypothesisBelief {
     Track,
 }
 
-/// What is true, where it differs from what the agent assumes.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct WorldSpec {
-    /// Which simulator stands for the world.
-    pub kind: WorldKind,
-    /// What happens at [`StateVariable::bounds`].
-    pub walls: Walls,
-    /// True start, where it differs from the believed one.
-    pub start: Option<Vec<StartHypothesis>>,
-    /// True motion of [`WorldKind::Linear`], where it differs from the assumed one.
-    pub motion: WorldMotion,
-}
-
-/// How the true linear motion `s' = A s + B u + v` differs from the assumed one.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct WorldMotion {
-    /// True process noise covariance of every action, `n x n`.
-    pub noise: Option<DMatrix<f64>>,
-    /// True controls of some actions and modes. The first that applies counts; otherwise the action's own.
-    pub controls: Vec<TrueControl>,
-}
-
-/// What an action truly does in a mode.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TrueControl {
-    /// Actions it applies to; `None` for all.
-    pub actions: Option<Vec<ActionId>>,
-    /// Mode it applies to; `None` for all.
-    pub mode: Option<ModeId>,
-    /// Control `u`, length `p`.
-    pub control: DVector<f64>,
-}
-
-/// The simulators.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub enum WorldKind {
-    /// The model's own linear motion and sensor.
-    #[default]
-    Linear,
-    /// The nonlinear cart and pole of Eq. 3.6 and 3.9.
-    CartPole(CartPole),
-    /// A two-wheeled robot in a walled arena.
-    Robot(Robot),
-}
-
-/// Parameters of the cart and pole, Table 3.1. State: position m, velocity m/s, angle from upright rad, rad/s.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, expecting = "a table")]
-pub struct CartPole {
-    /// Mass of the cart, kg.
-    pub cart_mass: f64,
-    /// Mass of the pole, kg.
-    pub pole_mass: f64,
-    /// Friction of the cart, N s/m.
-    pub friction: f64,
-    /// Distance from hinge to the pole's centre of mass, m.
-    pub length: f64,
-    /// Moment of inertia of the pole about its centre of mass, kg m^2.
-    pub inertia: f64,
-    /// Gravity, m/s^2.
-    pub gravity: f64,
-    /// Duration of a step, s.
-    pub step: f64,
-    /// Variance of the noise on the force, N^2.
-    pub force_noise: f64,
-}
-
-/// What happens to the true state at the bounds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Walls {
-    /// There are no walls: the bounds are only a hint.
-    #[default]
-    None,
-    /// The state stops at the bounds and, going straight, at the walls and blocked cells of the map.
-    Clamp,
-}
-
 impl Model {
     /// Number of state variables, `n`.
     pub fn state_dim(&self) -> usize {
@@ -442,14 +350,7 @@ impl Event {
     }
 }
 
-impl TrueControl {
-    /// Whether this is what the action does in this mode.
-    pub fn applies(&self, mode: ModeId, action: ActionId) -> bool {
-        applies(&self.actions, self.mode, mode, action)
-    }
-}
-
-fn applies(
+pub(crate) fn applies(
     actions: &Option<Vec<ActionId>>,
     needed: Option<ModeId>,
     mode: ModeId,

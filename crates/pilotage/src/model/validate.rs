@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use super::error::{Fault, Path};
 use super::*;
-pub(super) use numbers::positive;
+pub(crate) use numbers::positive;
 use numbers::{covariance, finite, finite_matrix, shape, vector};
 
 /// Weights of hypotheses may miss 1 by this much, which decimals such as 0.333333333 need.
@@ -48,8 +48,7 @@ impl Model {
             finite(event.reward, path.key("reward"))?;
         }
         self.check_cost()?;
-        self.check_belief()?;
-        self.check_world()
+        self.check_belief()
     }
 
     fn check_state(&self) -> Result<(), Fault> {
@@ -148,7 +147,11 @@ impl Model {
         Ok(())
     }
 
-    fn check_hypotheses(&self, start: &[StartHypothesis], path: &Path) -> Result<(), Fault> {
+    pub(crate) fn check_hypotheses(
+        &self,
+        start: &[StartHypothesis],
+        path: &Path,
+    ) -> Result<(), Fault> {
         if start.is_empty() {
             return Err(Fault::new(
                 path.clone(),
@@ -239,7 +242,7 @@ impl Model {
         }
     }
 
-    fn check_condition(
+    pub(crate) fn check_condition(
         &self,
         actions: &Option<Vec<ActionId>>,
         mode: Option<ModeId>,
@@ -334,50 +337,17 @@ impl Model {
         Ok(())
     }
 
-    fn check_world(&self) -> Result<(), Fault> {
-        let path = Path::new("world");
-        if let WorldKind::CartPole(parameters) = &self.world.kind {
-            parameters.validate(&path.clone().key("cart-pole"))?;
-            if (self.state_dim(), self.motion.b.ncols()) != (4, 1) {
-                return Err(Fault::new(
-                    path.key("kind"),
-                    format!(
-                        "the cart and pole have 4 state variables and 1 control, this model {} and {}",
-                        self.state_dim(),
-                        self.motion.b.ncols()
-                    ),
-                    "name position, velocity, angle and angular velocity, in this order",
-                ));
-            }
-        }
-        if let WorldKind::Robot(robot) = &self.world.kind {
-            robot.validate(self)?;
-        }
-        let unbounded = self
-            .state
-            .iter()
-            .all(|variable| variable.bounds == Interval::ALL);
-        if self.world.walls == Walls::Clamp && unbounded {
-            return Err(Fault::new(
-                path.key("walls"),
-                "walls at the bounds, and there are no bounds",
-                "add `bounds` to [state], or delete `walls`",
-            ));
-        }
-        self.check_world_motion(&path.clone().key("motion"))?;
-        match &self.world.start {
-            Some(start) => self.check_hypotheses(start, &path.key("start")),
-            None => Ok(()),
-        }
-    }
-
-    fn check_control(&self, control: &DVector<f64>, path: &Path) -> Result<(), Fault> {
+    pub(crate) fn check_control(&self, control: &DVector<f64>, path: &Path) -> Result<(), Fault> {
         let controls = self.motion.b.ncols();
         let expected = format!("there are {controls} controls, the columns of B");
         vector(control, controls, &expected, path.clone().key("u"))
     }
 
-    fn check_motion_noise(&self, noise: Option<&DMatrix<f64>>, path: &Path) -> Result<(), Fault> {
+    pub(crate) fn check_motion_noise(
+        &self,
+        noise: Option<&DMatrix<f64>>,
+        path: &Path,
+    ) -> Result<(), Fault> {
         let Some(noise) = noise else {
             return Ok(());
         };
@@ -389,54 +359,10 @@ impl Model {
             path.clone().key("noise"),
         )
     }
-
-    fn check_world_motion(&self, path: &Path) -> Result<(), Fault> {
-        let motion = &self.world.motion;
-        if *motion == WorldMotion::default() {
-            return Ok(());
-        }
-        if self.world.kind != WorldKind::Linear {
-            return Err(Fault::of_key(
-                path.clone(),
-                "the simulator has its own motion",
-                "delete this table, or `kind`",
-            ));
-        }
-        self.check_motion_noise(motion.noise.as_ref(), path)?;
-        for (i, entry) in motion.controls.iter().enumerate() {
-            let path = path.clone().key("control").index(i);
-            self.check_condition(&entry.actions, entry.mode, &Region::everywhere(), &path)?;
-            self.check_control(&entry.control, &path)?;
-        }
-        Ok(())
-    }
-}
-
-impl CartPole {
-    /// Checks that the parameters are physical; `path` is where the model has them.
-    pub(super) fn validate(&self, path: &Path) -> Result<(), Fault> {
-        for (key, value) in [
-            ("cart_mass", self.cart_mass),
-            ("pole_mass", self.pole_mass),
-            ("length", self.length),
-            ("gravity", self.gravity),
-            ("step", self.step),
-        ] {
-            positive(value, false, path.clone().key(key))?;
-        }
-        for (key, value) in [
-            ("friction", self.friction),
-            ("inertia", self.inertia),
-            ("force_noise", self.force_noise),
-        ] {
-            positive(value, true, path.clone().key(key))?;
-        }
-        Ok(())
-    }
 }
 
 /// Checks that there are state variables, modes and actions, and that none of a kind share a name.
-pub(super) fn check_names<S: AsRef<str>>(
+pub(crate) fn check_names<S: AsRef<str>>(
     variables: &[S],
     modes: &[impl AsRef<str>],
     actions: &[S],

@@ -3,9 +3,10 @@
 use super::finding::{Frame, Hypothesis, Recording};
 use crate::belief::{Belief, BeliefMdp};
 use crate::error::{Error, Result};
-use crate::model::{self, Interval, ModeId, Model, Region, Walls};
+use crate::model::{Interval, ModeId, Model, Region};
 use crate::observe::Observer;
 use crate::policy::{Automaton, Controller, Matching};
+use crate::scenario::{self, Scenario, Truth, Walls};
 use crate::simulate::{Agent, FilterAgent, run_episode, wake_up};
 use crate::solve::{SolveSettings, SolverKind, solve};
 use crate::world::{Draws, ProblemWorld, World};
@@ -48,18 +49,18 @@ pub fn episodes(seed: u64, observer: &dyn Observer) -> Result<Vec<Recording>> {
         ),
     ];
     let recordings = shown.map(|(name, most_steps, title, about)| {
-        let model = model::find(name).map_err(|error| Error::Unknown {
+        let scenario = scenario::find(name).map_err(|error| Error::Unknown {
             what: "built-in model",
             name: name.to_owned(),
             hint: error.message,
         })?;
         let solution = solve(
             SolverKind::KbviClosed,
-            &model,
+            &scenario,
             &SolveSettings::default(),
             observer,
         )?;
-        let mdp = BeliefMdp::new(&model);
+        let mdp = BeliefMdp::new(&scenario.model);
         let empty = Automaton::new(&mdp, "", Matching::Nearest);
         let automaton = solution.automaton().unwrap_or(&empty);
         let take = Take {
@@ -70,7 +71,7 @@ pub fn episodes(seed: u64, observer: &dyn Observer) -> Result<Vec<Recording>> {
         Ok(Recording {
             title: title.to_owned(),
             about: about.to_owned(),
-            ..record(&mdp, automaton, take)?
+            ..record(&mdp, &scenario.truth, automaton, take)?
         })
     });
     recordings.into_iter().collect()
@@ -81,8 +82,17 @@ pub fn episodes(seed: u64, observer: &dyn Observer) -> Result<Vec<Recording>> {
 ///
 /// # Errors
 /// [`Error::Unsupported`] for models with more than two state variables.
-pub fn record(mdp: &BeliefMdp, automaton: &Automaton, take: Take) -> Result<Recording> {
-    let mut model = mdp.model().clone();
+pub fn record(
+    mdp: &BeliefMdp,
+    truth: &Truth,
+    automaton: &Automaton,
+    take: Take,
+) -> Result<Recording> {
+    let mut scenario = Scenario {
+        model: mdp.model().clone(),
+        truth: truth.clone(),
+    };
+    let model = mdp.model();
     if model.state_dim() > 2 {
         return Err(Error::Unsupported {
             solver: "recording an episode",
@@ -90,22 +100,22 @@ pub fn record(mdp: &BeliefMdp, automaton: &Automaton, take: Take) -> Result<Reco
                 "it has {} state variables, and one or two can be drawn",
                 model.state_dim()
             ),
-            model: model.name,
+            model: model.name.clone(),
         });
     }
     let controller = Controller::new(automaton);
     let frames = if mdp.starts().len() > 1 {
-        model.world.start = None;
+        scenario.truth.start = None;
         let wake_up::Settings {
             tracking, choice, ..
         } = wake_up::Settings::default();
         let mut agent = wake_up::WakeUpAgent::new(mdp, &controller, tracking, choice)?;
-        run(mdp, &model, automaton, &mut agent, take)
+        run(mdp, &scenario, automaton, &mut agent, take)
     } else {
         let mut agent = FilterAgent::new(&automaton.filter, &controller);
-        run(mdp, &model, automaton, &mut agent, take)
+        run(mdp, &scenario, automaton, &mut agent, take)
     };
-    let bounds = bounds(&model, &frames);
+    let bounds = bounds(model, &frames);
     let corners = |region: &Region| corners(region, &bounds);
     let map = model.map.as_ref();
     Ok(Recording {
@@ -113,7 +123,7 @@ pub fn record(mdp: &BeliefMdp, automaton: &Automaton, take: Take) -> Result<Reco
         title: model.name.clone(),
         about: model.about.clone(),
         states: automaton.states.clone(),
-        places: places(&model)
+        places: places(model)
             .into_iter()
             .map(|(region, name)| {
                 let (lower, upper) = corners(&region);
@@ -121,7 +131,7 @@ pub fn record(mdp: &BeliefMdp, automaton: &Automaton, take: Take) -> Result<Reco
             })
             .collect(),
         blocked: map.map_or_else(Vec::new, |map| map.blocked.iter().map(corners).collect()),
-        walls: walls(&model),
+        walls: walls(&scenario),
         nodes: automaton
             .nodes
             .iter()
@@ -136,12 +146,13 @@ pub fn record(mdp: &BeliefMdp, automaton: &Automaton, take: Take) -> Result<Reco
 /// The frames of an episode: each the state and belief before a step, with what was done there and what it paid.
 fn run(
     mdp: &BeliefMdp,
-    model: &Model,
+    scenario: &Scenario,
     automaton: &Automaton,
     agent: &mut dyn Agent,
     take: Take,
 ) -> Vec<Frame> {
-    let mut world = ProblemWorld::new(model);
+    let model = &scenario.model;
+    let mut world = ProblemWorld::new(scenario);
     // The run below draws the same start once more.
     world.reset(&mut Draws::new(take.seed, take.episode));
     agent.reset();
@@ -261,8 +272,9 @@ fn corners(region: &Region, bounds: &[(f64, f64)]) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// The walls that stop the true state: thin ones of a map, and those around everything.
-fn walls(model: &Model) -> Vec<((f64, f64), (f64, f64))> {
-    if model.world.walls == Walls::None {
+fn walls(scenario: &Scenario) -> Vec<((f64, f64), (f64, f64))> {
+    let model = &scenario.model;
+    if scenario.truth.walls == Walls::None {
         return Vec::new();
     }
     let sides: Vec<Interval> = match &model.map {

@@ -5,14 +5,15 @@ use std::collections::BTreeSet;
 use super::svg::text_width;
 use super::*;
 use crate::belief::{Belief, BeliefMdp};
-use crate::model::{self, ActionId};
+use crate::model::ActionId;
 use crate::observe::Silent;
 use crate::policy::{Automaton, Matching, Node, Place, Policy};
+use crate::scenario;
 use crate::solve::compile;
 use crate::solve::kbvi::closed;
 
 fn mdp(name: &str) -> BeliefMdp {
-    BeliefMdp::new(&model::find(name).expect("a built-in model"))
+    BeliefMdp::new(&scenario::find(name).expect("a built-in model").model)
 }
 
 fn solved(name: &str, matching: Matching) -> (BeliefMdp, closed::GridPolicy, Automaton) {

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{Agent, Episode, FilterAgent, run_episode};
 use crate::belief::Filter;
-use crate::model::Model;
 use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::Policy;
+use crate::scenario::Scenario;
 use crate::world::{Draws, ProblemWorld};
 
 /// How to evaluate.
@@ -74,16 +74,16 @@ pub type Difference = Estimate;
 
 const CHUNK: usize = 64;
 
-/// Runs the policy in the model's world. The same numbers for any number of threads.
+/// Runs the policy in the scenario's world. The same numbers for any number of threads.
 pub fn evaluate(
-    model: &Model,
+    scenario: &Scenario,
     filter: &Filter,
     policy: &dyn Policy,
     options: Options,
     observer: &dyn Observer,
 ) -> Evaluation {
     summarise(&episodes(
-        model,
+        scenario,
         &|| Box::new(FilterAgent::new(filter, policy)),
         options,
         observer,
@@ -92,17 +92,17 @@ pub fn evaluate(
 
 /// As [`evaluate`], for agents of any make.
 pub fn evaluate_agents<'a>(
-    model: &Model,
+    scenario: &Scenario,
     agent: &(dyn Fn() -> Box<dyn Agent + 'a> + Sync),
     options: Options,
     observer: &dyn Observer,
 ) -> Evaluation {
-    summarise(&episodes(model, agent, options, observer))
+    summarise(&episodes(scenario, agent, options, observer))
 }
 
 /// Discounted return of `first` less that of `second` in the same worlds with the same noise, a paired comparison.
 pub fn compare(
-    model: &Model,
+    scenario: &Scenario,
     filter: &Filter,
     first: &dyn Policy,
     second: &dyn Policy,
@@ -111,7 +111,7 @@ pub fn compare(
 ) -> Difference {
     let run = |policy| {
         episodes(
-            model,
+            scenario,
             &|| Box::new(FilterAgent::new(filter, policy)),
             options,
             observer,
@@ -127,14 +127,15 @@ pub fn compare(
 }
 
 fn episodes<'a>(
-    model: &Model,
+    scenario: &Scenario,
     agent: &(dyn Fn() -> Box<dyn Agent + 'a> + Sync),
     options: Options,
     observer: &dyn Observer,
 ) -> Vec<Episode> {
+    let model = &scenario.model;
     let limits = (model.episode.length, model.discount);
     run_all(options, observer, &|| {
-        let mut world = ProblemWorld::new(model);
+        let mut world = ProblemWorld::new(scenario);
         let mut agent = agent();
         let mut observation = vec![0.0; model.observation_dim()];
         Box::new(move |episode| {

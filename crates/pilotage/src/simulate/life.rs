@@ -8,6 +8,7 @@ use crate::model::{Model, Then};
 use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::Policy;
+use crate::scenario::Scenario;
 use crate::world::{Draws, ProblemWorld, World};
 
 /// How long to watch.
@@ -78,10 +79,10 @@ impl Life {
     }
 }
 
-/// Runs the policy in the model's world, starting a new life after every failure; the length of episodes does not count. The same
+/// Runs the policy in the scenario's world, starting a new life after every failure; the length of episodes does not count. The same
 /// numbers for any number of threads.
 pub fn life(
-    model: &Model,
+    scenario: &Scenario,
     filter: &Filter,
     policy: &dyn Policy,
     options: LifeOptions,
@@ -89,10 +90,16 @@ pub fn life(
 ) -> Life {
     let done = std::sync::atomic::AtomicU64::new(0);
     let runs = parallel::map(options.runs, |run| {
-        let mut world = ProblemWorld::new(model);
+        let mut world = ProblemWorld::new(scenario);
         let mut agent = FilterAgent::new(filter, policy);
         let mut draws = Draws::new(options.seed, run as u64);
-        let counted = run_lives(&mut world, &mut agent, &mut draws, model, options.steps);
+        let counted = run_lives(
+            &mut world,
+            &mut agent,
+            &mut draws,
+            &scenario.model,
+            options.steps,
+        );
         let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
         observer.progress("runs", done, options.runs as u64);
         counted

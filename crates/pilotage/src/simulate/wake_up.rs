@@ -13,6 +13,7 @@ use crate::model::{ActionId, Region};
 use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::Policy;
+use crate::scenario::{Scenario, Truth};
 use crate::world::{Draws, ProblemWorld};
 
 /// Which action a lost agent takes.
@@ -240,13 +241,14 @@ struct Pair {
 
 const CHUNK: usize = 32;
 
-/// Kidnaps the agent over and over. The truth is one of the start hypotheses, drawn by weight. The same numbers for any number of threads.
+/// Kidnaps the agent over and over, in a world with such a truth. The truth is one of the start hypotheses, drawn by weight. The same numbers for any number of threads.
 ///
 /// # Errors
 /// [`Error::Unsupported`] for a model with one start, or without anything good to reach; [`Error::Setting`] for settings out of
 /// range.
 pub fn measure(
     mdp: &BeliefMdp,
+    truth: &Truth,
     policy: &dyn Policy,
     settings: &Settings,
     observer: &dyn Observer,
@@ -259,21 +261,28 @@ pub fn measure(
         .iter()
         .map(|(_, start)| mdp.filter_from(start))
         .collect();
-    let mut model = mdp.model().clone();
-    model.world.start = None;
+    let model = mdp.model();
+    // It wakes up where it believes it may be, wherever else an episode would start.
+    let scenario = Scenario {
+        model: model.clone(),
+        truth: Truth {
+            start: None,
+            ..truth.clone()
+        },
+    };
     let done = std::sync::atomic::AtomicU64::new(0);
     let chunks = parallel::map(settings.episodes.div_ceil(CHUNK), |chunk| {
         let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(settings.episodes);
         let count = range.len() as u64;
-        let mut world = ProblemWorld::new(&model);
+        let mut world = ProblemWorld::new(&scenario);
         let mut lost = WakeUpAgent::new(mdp, policy, settings.tracking, settings.choice)?;
         let pairs: Vec<Pair> = range
             .map(|episode| {
                 let draws = || Draws::new(settings.seed, episode as u64);
-                let of_lost = run(&mut world, &mut lost, draws(), &goals, &model);
+                let of_lost = run(&mut world, &mut lost, draws(), &goals, model);
                 let truth = world.hypothesis();
                 let mut knows = FilterAgent::new(&told[truth], policy);
-                let of_told = run(&mut world, &mut knows, draws(), &goals, &model);
+                let of_told = run(&mut world, &mut knows, draws(), &goals, model);
                 Pair {
                     lost: of_lost,
                     told: of_told,

@@ -3,15 +3,12 @@
 //! Beliefs are simulated, not states: at every step the belief itself says how likely the true state is outside the limits. The
 //! average of that over a run is the probability of failing in a step, found with far fewer steps than counting failures takes
 //! (Rao-Blackwell). A run starts afresh with just that probability.
-//!
-//! Where the world starts otherwise than the agent believes, what is sensed comes from the belief of an observer who knows, and
-//! so does the probability; the agent acts on its own belief.
 
 use nalgebra::DMatrix;
 
 use crate::belief::gaussian::exit_probability;
 use crate::belief::{Belief, BeliefMdp, Filter, LevelId};
-use crate::model::{Interval, Model, Region, WorldSpec};
+use crate::model::{Interval, Region};
 use crate::parallel;
 use crate::policy::Policy;
 use crate::random::{Rng, Role, stream, uniform};
@@ -20,11 +17,8 @@ use crate::world::Noise;
 /// Runs of beliefs from one start.
 #[derive(Debug)]
 pub struct Runs {
-    agent: Filter,
-    /// The observer who knows the start, and its covariances; acts as the agent's filter where both believe the same.
-    observer: Filter,
+    filter: Filter,
     covariances: Vec<DMatrix<f64>>,
-    differ: bool,
     alive: Region,
     /// `H A` row by row, `H B u` by action, innovation by level and action.
     carried: Vec<f64>,
@@ -52,24 +46,16 @@ impl Runs {
             mean: vec![0.0; mdp.model().state_dim()],
         };
         let filter = Filter::new(mdp.model(), mdp.levels(), &start);
-        Self::new(mdp, filter.clone(), filter, false)
+        Self::new(mdp, filter)
     }
 
-    /// Runs that begin as an episode does, from the world's own start where the model file states one.
+    /// Runs that begin as an episode does.
     pub fn from_start(mdp: &BeliefMdp) -> Self {
-        let Some(start) = &mdp.model().world.start else {
-            return Self::new(mdp, mdp.filter(), mdp.filter(), false);
-        };
-        let informed = BeliefMdp::new(&Model {
-            start: start.clone(),
-            world: WorldSpec::default(),
-            ..mdp.model().clone()
-        });
-        Self::new(&informed, mdp.filter(), informed.filter(), true)
+        Self::new(mdp, mdp.filter())
     }
 
-    fn new(informed: &BeliefMdp, agent: Filter, observer: Filter, differ: bool) -> Self {
-        let (model, levels) = (informed.model(), informed.levels());
+    fn new(mdp: &BeliefMdp, filter: Filter) -> Self {
+        let (model, levels) = (mdp.model(), mdp.levels());
         let actions = 0..model.actions.len();
         let h = &model.sensor.h;
         let innovation = |level, action| {
@@ -77,12 +63,10 @@ impl Runs {
             Noise::new(&step.correction.innovation)
         };
         Self {
-            agent,
-            observer,
+            filter,
             covariances: (0..levels.len())
                 .map(|level| levels.covariance(level).clone())
                 .collect(),
-            differ,
             alive: model.episode.alive.clone(),
             carried: (h * &model.motion.a).transpose().as_slice().to_vec(),
             pushed: actions
@@ -134,7 +118,7 @@ impl Runs {
 
     /// Standard deviation of the mean of the belief about 0, by variable.
     pub fn spread(&self, policy: &dyn Policy, sample: Sample) -> Vec<f64> {
-        let n = self.observer.states();
+        let n = self.filter.states();
         let sums = parallel::map(sample.runs, |run| {
             let mut sum = vec![0.0; n];
             self.run(policy, sample, run, &mut |mean, _| {
@@ -159,33 +143,24 @@ impl Runs {
     ) {
         let mut sensor = stream(sample.seed, run as u64, Role::Sensor);
         let mut fate = stream(sample.seed, run as u64, Role::World);
-        let (mut agent, mut observer) = (self.agent.initial(), self.observer.initial());
+        let mut belief = self.filter.initial();
         let mut observation = vec![0.0; self.pushed.first().map_or(0, Vec::len)];
-        let mut scratch = vec![0.0; self.observer.states()];
+        let mut scratch = vec![0.0; self.filter.states()];
         for _ in 0..sample.steps {
-            let held = if self.differ { &agent } else { &observer };
-            let action = policy.action(held);
-            self.sense(&observer, action, &mut observation, &mut sensor);
-            self.observer
-                .update(&mut observer, action, &observation, &mut scratch);
-            if self.differ {
-                self.agent
-                    .update(&mut agent, action, &observation, &mut scratch);
-            }
-            let hazard = exit_probability(
-                &observer.mean,
-                &self.covariances[observer.level],
-                &self.alive,
-            );
-            visit(&observer.mean, hazard);
+            let action = policy.action(&belief);
+            self.sense(&belief, action, &mut observation, &mut sensor);
+            self.filter
+                .update(&mut belief, action, &observation, &mut scratch);
+            let hazard =
+                exit_probability(&belief.mean, &self.covariances[belief.level], &self.alive);
+            visit(&belief.mean, hazard);
             if uniform(&mut fate) < hazard {
-                self.observer.reset(&mut observer);
-                self.agent.reset(&mut agent);
+                self.filter.reset(&mut belief);
             }
         }
     }
 
-    /// Draws what is sensed after an action from what the observer expects.
+    /// Draws what is sensed after an action from what the belief expects.
     fn sense(&self, from: &Belief, action: usize, observation: &mut [f64], rng: &mut Rng) {
         let n = from.mean.len();
         for ((reading, row), pushed) in observation

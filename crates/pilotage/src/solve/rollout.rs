@@ -4,6 +4,7 @@ use crate::belief::{Belief, BeliefMdp, Filter};
 use crate::model::ActionId;
 use crate::parallel;
 use crate::policy::Policy;
+use crate::scenario::Scenario;
 use crate::simulate::{Agent, FilterAgent, run_episode};
 use crate::world::{Draws, ProblemWorld, World};
 
@@ -18,7 +19,7 @@ pub struct Decision {
     pub observation: Vec<f64>,
 }
 
-/// Runs `episodes` episodes and returns the decisions of each. The same for any number of threads.
+/// Runs `episodes` episodes in the world that the model assumes and returns the decisions of each. The same for any number of threads.
 ///
 /// Where the start hypotheses of a belief are tracked, the agent is told which of them is true: one policy serves all of them.
 pub fn decisions(
@@ -30,6 +31,7 @@ pub fn decisions(
     seed: u64,
 ) -> Vec<Vec<Decision>> {
     let model = mdp.model();
+    let scenario = Scenario::assumed(model);
     let told: Vec<Filter> = match mdp.starts() {
         [_] => vec![filter.clone()],
         starts => starts
@@ -38,7 +40,7 @@ pub fn decisions(
             .collect(),
     };
     parallel::map(episodes, |episode| {
-        let mut world = ProblemWorld::new(model);
+        let mut world = ProblemWorld::new(&scenario);
         world.reset(&mut Draws::new(seed, episode as u64));
         let mut agent = Recorder {
             inner: FilterAgent::new(&told[world.hypothesis().min(told.len() - 1)], policy),

@@ -10,9 +10,9 @@ use super::qmdp::Qmdp;
 use super::{Form, Learning, Solution, Solved, SolverKind, arkaq, compile, kafaq, lqg, mdp};
 use crate::belief::BeliefMdp;
 use crate::error::Result;
-use crate::model::Model;
 use crate::observe::Observer;
 use crate::policy::{Automaton, Controller, Policy};
+use crate::scenario::Scenario;
 use crate::world::{ProblemWorld, World};
 
 /// Settings of all solvers; each takes what concerns it.
@@ -92,17 +92,18 @@ impl SolveSettings {
     }
 }
 
-/// Solves a model.
+/// Solves a scenario: planners are handed its model alone, learners act in its world.
 ///
 /// # Errors
 /// [`crate::Error::Unsupported`] where the solver does not accept the model, [`crate::Error::NoSteadyState`] where the agent's uncertainty grows
 /// without end, and the solver's own.
 pub fn solve(
     kind: SolverKind,
-    model: &Model,
+    scenario: &Scenario,
     settings: &SolveSettings,
     observer: &dyn Observer,
 ) -> Result<Solution> {
+    let model = &scenario.model;
     kind.accepts_with(model, settings)?;
     let mdp = BeliefMdp::new(model);
     if kind == SolverKind::Lqg && lqg::use_of(model) == Ok(lqg::Use::Control) {
@@ -128,7 +129,7 @@ pub fn solve(
             let converged = policy.converged();
             planned(kind, &mdp, policy, converged, settings)
         }
-        SolverKind::Kafaq | SolverKind::Arkaq => learned(kind, &mdp, settings, observer),
+        SolverKind::Kafaq | SolverKind::Arkaq => learned(kind, scenario, &mdp, settings, observer),
         SolverKind::Mls => {
             let policy = MostLikelyState::solve(&mdp, &settings.states(), observer)?;
             let converged = policy.converged();
@@ -180,16 +181,17 @@ fn kbvi(mdp: &BeliefMdp, settings: &SolveSettings, observer: &dyn Observer) -> R
     })
 }
 
-/// Learned in the model's own world. What was learned is the automaton, in whatever form it is asked for.
+/// Learned in the scenario's world. What was learned is the automaton, in whatever form it is asked for.
 fn learned(
     kind: SolverKind,
+    scenario: &Scenario,
     mdp: &BeliefMdp,
     settings: &SolveSettings,
     observer: &dyn Observer,
 ) -> Result<Solution> {
     let model = mdp.model();
     let (seed, checkpoint) = (settings.seed, settings.checkpoint.as_deref());
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(scenario)) };
     let (mut automaton, samples, converged, learning) = if kind == SolverKind::Arkaq {
         let own = arkaq::Settings {
             seed,

@@ -3,9 +3,10 @@
 use super::{arkaq, kafaq, lqg};
 use crate::belief::Filter;
 use crate::error::{Error, Result};
-use crate::model::{Model, suggest};
+use crate::model::suggest;
 use crate::observe::Observer;
 use crate::policy::{Automaton, Controller, Matching, Policy};
+use crate::scenario::Scenario;
 use crate::simulate::{Difference, Evaluation, Options, compare, evaluate};
 
 /// Form of the policy a planner hands over. Learners hand over the form they learned.
@@ -123,7 +124,7 @@ impl Solution {
     pub fn value_lost(
         &self,
         planner: &Self,
-        model: &Model,
+        scenario: &Scenario,
         options: Options,
         observer: &dyn Observer,
     ) -> Option<Difference> {
@@ -132,20 +133,30 @@ impl Solution {
         };
         let compiled = Controller::new(self.automaton()?);
         let (planner, compiled): (&dyn Policy, &dyn Policy) = (policy.as_ref(), &compiled);
-        Some(compare(model, filter, planner, compiled, options, observer))
+        Some(compare(
+            scenario, filter, planner, compiled, options, observer,
+        ))
     }
 
-    /// Runs the policy in the model's world, by the standard of [`crate::simulate`].
-    pub fn evaluate(&self, model: &Model, options: Options, observer: &dyn Observer) -> Evaluation {
-        match &self.policy {
+    /// Runs the policy in the scenario's world, by the standard of [`crate::simulate`].
+    ///
+    /// # Errors
+    /// As [`lqg::Controller::evaluate`], for a free control.
+    pub fn evaluate(
+        &self,
+        scenario: &Scenario,
+        options: Options,
+        observer: &dyn Observer,
+    ) -> Result<Evaluation> {
+        Ok(match &self.policy {
             Solved::Automaton(automaton) => {
                 let controller = Controller::new(automaton);
-                evaluate(model, &automaton.filter, &controller, options, observer)
+                evaluate(scenario, &automaton.filter, &controller, options, observer)
             }
-            Solved::Control(controller) => controller.evaluate(options, observer),
+            Solved::Control(controller) => controller.evaluate(scenario, options, observer)?,
             Solved::Rule { policy, filter } => {
-                evaluate(model, filter, policy.as_ref(), options, observer)
+                evaluate(scenario, filter, policy.as_ref(), options, observer)
             }
-        }
+        })
     }
 }

@@ -6,9 +6,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::kbvi::closed;
 use crate::belief::{Belief, BeliefMdp, Filter};
 use crate::error::Result;
-use crate::model::{ActionId, Model, Region};
+use crate::model::{ActionId, Region};
 use crate::observe::Observer;
 use crate::policy::Policy;
+use crate::scenario::Scenario;
 use crate::simulate::{Agent, Estimate, Evaluation, Options, evaluate, run_episode};
 use crate::world::{Draws, ProblemWorld};
 
@@ -30,63 +31,68 @@ pub struct Yardstick {
 /// # Errors
 /// As [`closed::solve`].
 pub fn yardsticks(
-    model: &Model,
+    scenario: &Scenario,
     planner: &closed::Settings,
     options: Options,
     observer: &dyn Observer,
 ) -> Result<Vec<Yardstick>> {
-    let told = told(model);
-    let plan = |model: &Model| closed::solve(&BeliefMdp::new(model), planner, observer);
-    let earned = |world: &Model, policy: &closed::GridPolicy| {
+    let told = told(scenario);
+    let plan = |told: &Scenario| closed::solve(&BeliefMdp::new(&told.model), planner, observer);
+    let earned = |world: &Scenario, policy: &closed::GridPolicy| {
         evaluate(world, &policy.mdp().filter(), policy, options, observer)
     };
     let mut found = Vec::new();
     let mut add = |who, earned| found.push(Yardstick { who, earned });
-    if told.modes.len() == 3 {
+    if told.model.modes.len() == 3 {
         let mut pair = told.clone();
-        pair.events
+        pair.model
+            .events
             .retain(|event| event.mode != Some(2) && event.becomes != Some(2));
         add(
             "closed-loop KBVI for a single pair, mode believed",
-            earned(model, &plan(&pair)?),
+            earned(scenario, &plan(&pair)?),
         );
     }
     let policy = plan(&told)?;
     add("closed-loop KBVI, mode believed", earned(&told, &policy));
-    if told.modes.len() > 1 {
+    if told.model.modes.len() > 1 {
         add(
             "closed-loop KBVI, mode seen",
             mode_seen(&told, &policy, options),
         );
     }
-    if told.modes.len() == 2 && told.state_dim() == 1 && told.actions.len() == 2 {
+    let model = &told.model;
+    if model.modes.len() == 2 && model.state_dim() == 1 && model.actions.len() == 2 {
         add(
             "best memoryless policy",
-            best_memoryless(model, options, observer),
+            best_memoryless(scenario, options, observer),
         );
     }
     Ok(found)
 }
 
-/// The model as a planner has to be told it.
-pub fn told(model: &Model) -> Model {
-    if model.world.motion.controls.is_empty() {
-        model.clone()
+/// The scenario as a planner has to be told it.
+pub fn told(scenario: &Scenario) -> Scenario {
+    if scenario.truth.motion.controls.is_empty() {
+        scenario.clone()
     } else {
-        controls_told(model)
+        controls_told(scenario)
     }
 }
 
-/// The model of one who knows what each mode's controls are: moving the way the mode does not allow is ruled out by its cost. Made
+/// The scenario of one who knows what each mode's controls are: moving the way the mode does not allow is ruled out by its cost. Made
 /// for the shuttle, whose first action moves the way it faces and whose other one turns it.
-fn controls_told(model: &Model) -> Model {
-    let mut told = model.clone();
-    if let Some(noise) = told.world.motion.noise.take() {
+fn controls_told(scenario: &Scenario) -> Scenario {
+    let Scenario {
+        model: mut told,
+        mut truth,
+    } = scenario.clone();
+    if let Some(noise) = truth.motion.noise.take() {
         told.motion.noise = noise;
     }
-    told.world.motion.controls.clear();
+    truth.motion.controls.clear();
     let [forward, turn] = told.actions.as_slice() else {
-        return told;
+        return Scenario { model: told, truth };
     };
     let (mut east, mut west, turn) = (forward.clone(), forward.clone(), turn.clone());
     (east.name, east.control[0]) = ("EAST".to_owned(), 1.0);
@@ -98,16 +104,17 @@ fn controls_told(model: &Model) -> Model {
     let mut forbidden = told.rewards[0].clone();
     forbidden.region = Region::everywhere();
     forbidden.value = -1_000.0;
-    for (mode, name) in model.modes.iter().enumerate() {
+    for (mode, name) in scenario.model.modes.iter().enumerate() {
         forbidden.mode = Some(mode);
         forbidden.actions = Some(vec![if name.starts_with("east") { 2 } else { 0 }]);
         told.rewards.push(forbidden.clone());
     }
-    told
+    Scenario { model: told, truth }
 }
 
 /// A policy that is shown the true mode at every step.
-fn mode_seen(model: &Model, policy: &dyn Policy, options: Options) -> Evaluation {
+fn mode_seen(scenario: &Scenario, policy: &dyn Policy, options: Options) -> Evaluation {
+    let model = &scenario.model;
     struct Seer<'a> {
         filter: Filter,
         policy: &'a dyn Policy,
@@ -141,7 +148,7 @@ fn mode_seen(model: &Model, policy: &dyn Policy, options: Options) -> Evaluation
         policy,
         mode: mode.clone(),
     };
-    let mut world = ProblemWorld::new(model);
+    let mut world = ProblemWorld::new(scenario);
     let mut observation = vec![0.0; model.observation_dim()];
     let episodes: Vec<_> = (0..options.episodes)
         .map(|episode| {
@@ -166,7 +173,7 @@ fn mode_seen(model: &Model, policy: &dyn Policy, options: Options) -> Evaluation
 }
 
 /// The best of all 1024 maps from ten cells of the line to two actions.
-fn best_memoryless(model: &Model, options: Options, observer: &dyn Observer) -> Evaluation {
+fn best_memoryless(scenario: &Scenario, options: Options, observer: &dyn Observer) -> Evaluation {
     const MAPS: usize = 1 << 10;
     struct Map(usize);
     impl Policy for Map {
@@ -174,8 +181,8 @@ fn best_memoryless(model: &Model, options: Options, observer: &dyn Observer) -> 
             self.0 >> ((belief.mean[0] / 0.4).clamp(0.0, 9.0) as usize) & 1
         }
     }
-    let filter = BeliefMdp::new(model).filter();
-    let earned = |map: &Map, options| evaluate(model, &filter, map, options, observer);
+    let filter = BeliefMdp::new(&scenario.model).filter();
+    let earned = |map: &Map, options| evaluate(scenario, &filter, map, options, observer);
     let quick = Options {
         episodes: 60,
         seed: 31,

@@ -1,6 +1,6 @@
 //! A cart with an inverted pole: the nonlinear equations of motion (Eq. 3.6 and 3.9).
 
-use crate::model::CartPole;
+use crate::scenario::CartPole;
 
 /// The plant. State: cart position m, velocity m/s, angle of the pole from upright rad, angular velocity rad/s.
 #[derive(Debug, Clone, PartialEq)]

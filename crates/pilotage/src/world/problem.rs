@@ -4,12 +4,11 @@ use super::cart_pole::Plant;
 use super::noise::Noise;
 use super::robot::RobotArena;
 use super::{Draws, Step, World};
-use crate::model::{
-    ActionId, Barriers, ModeId, Model, StartHypothesis, StartShape, Then, Walls, When, WorldKind,
-};
+use crate::model::{ActionId, Barriers, ModeId, Model, StartHypothesis, StartShape, Then, When};
 use crate::random::{normal, uniform};
+use crate::scenario::{Scenario, Simulator, Walls};
 
-/// The true world of a [`Model`]: its own linear motion unless the file names another simulator.
+/// The true world of a [`Scenario`]: its model's own linear motion unless it names another simulator.
 #[derive(Debug, Clone)]
 pub struct ProblemWorld {
     model: Model,
@@ -45,27 +44,28 @@ enum Dynamics {
 }
 
 impl ProblemWorld {
-    /// The world of a model, at a start that [`World::reset`] has yet to draw.
-    pub fn new(model: &Model) -> Self {
+    /// The world of a scenario, at a start that [`World::reset`] has yet to draw.
+    pub fn new(scenario: &Scenario) -> Self {
+        let (model, truth) = (&scenario.model, &scenario.truth);
         let actions = 0..model.actions.len();
-        let dynamics = match &model.world.kind {
-            WorldKind::Linear => Dynamics::Linear {
+        let dynamics = match &truth.simulator {
+            Simulator::Linear => Dynamics::Linear {
                 a: model.motion.a.transpose().as_slice().to_vec(),
                 displacements: (0..model.modes.len())
                     .map(|mode| {
-                        let truly = |action| displacement(model, mode, action);
+                        let truly = |action| displacement(scenario, mode, action);
                         actions.clone().map(truly).collect()
                     })
                     .collect(),
                 noise: actions
                     .clone()
                     .map(|action| {
-                        let truly = model.world.motion.noise.as_ref();
+                        let truly = truth.motion.noise.as_ref();
                         Noise::new(truly.unwrap_or_else(|| model.motion_noise(action)))
                     })
                     .collect(),
             },
-            WorldKind::CartPole(parameters) => Dynamics::CartPole {
+            Simulator::CartPole(parameters) => Dynamics::CartPole {
                 plant: Plant::new(parameters.clone()),
                 forces: model
                     .actions
@@ -74,7 +74,7 @@ impl ProblemWorld {
                     .collect(),
                 force_sd: parameters.force_noise.sqrt(),
             },
-            WorldKind::Robot(robot) => Dynamics::Robot {
+            Simulator::Robot(robot) => Dynamics::Robot {
                 arena: RobotArena::new(robot, model),
                 displacements: actions
                     .clone()
@@ -82,9 +82,9 @@ impl ProblemWorld {
                     .collect(),
             },
         };
-        let starts = model.world.start.as_ref().unwrap_or(&model.start);
         Self {
-            starts: starts
+            starts: scenario
+                .start()
                 .iter()
                 .map(|start| (start.clone(), Noise::new(&start.covariance)))
                 .collect(),
@@ -92,7 +92,7 @@ impl ProblemWorld {
             sensor_noise: actions
                 .map(|action| Noise::new(model.sensor_noise(action)))
                 .collect(),
-            walls: (model.world.walls == Walls::Clamp).then(|| Barriers::new(model)),
+            walls: (truth.walls == Walls::Clamp).then(|| Barriers::new(model)),
             state: model.start[0].mean.as_slice().to_vec(),
             scratch: vec![0.0; model.state_dim()],
             mode: model.start[0].mode,
@@ -196,8 +196,9 @@ impl ProblemWorld {
 }
 
 /// True `B u` of an action in a mode.
-fn displacement(model: &Model, mode: ModeId, action: ActionId) -> Vec<f64> {
-    let mut controls = model.world.motion.controls.iter();
+fn displacement(scenario: &Scenario, mode: ModeId, action: ActionId) -> Vec<f64> {
+    let model = &scenario.model;
+    let mut controls = scenario.truth.motion.controls.iter();
     let truly = controls.find(|control| control.applies(mode, action));
     let control = truly.map_or(&model.actions[action].control, |truly| &truly.control);
     (&model.motion.b * control).as_slice().to_vec()

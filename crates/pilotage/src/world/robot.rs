@@ -6,8 +6,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::model::{Model, Robot};
+use crate::model::Model;
 use crate::random::{Rng, normal};
+use crate::scenario::Robot;
 
 /// How fast a deviation of the heading is turned back, per second.
 const GAIN: f64 = 4.0;
@@ -207,15 +208,14 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
-    use crate::model::{WorldKind, find};
     use crate::random::{Role, stream};
+    use crate::scenario::{Scenario, Simulator, find};
 
     fn arena(change: impl Fn(&mut Robot)) -> RobotArena {
-        let model = find("robot-maze-4x4").unwrap();
-        let WorldKind::Robot(robot) = &model.world.kind else {
+        let Scenario { model, truth } = find("robot-maze-4x4").unwrap();
+        let Simulator::Robot(mut robot) = truth.simulator else {
             panic!("no robot");
         };
-        let mut robot = robot.clone();
         (robot.slip, robot.compass_noise, robot.range_noise) = (0.0, 0.0, 0.0);
         change(&mut robot);
         RobotArena::new(&robot, &model)

@@ -3,12 +3,19 @@
 
 use nalgebra::{DMatrix, DVector};
 use pilotage::model::{
-    self, Action, BeliefSettings, Episode, Interval, Model, Motion, Sensor, StartHypothesis,
-    StartShape, StateVariable, Then, WorldSpec,
+    Action, BeliefSettings, Episode, Interval, Model, Motion, Sensor, StartHypothesis, StartShape,
+    StateVariable, Then,
 };
+use pilotage::scenario::{self, Scenario};
 
+/// A built-in model.
 pub fn built_in(name: &str) -> Model {
-    model::find(name).unwrap_or_else(|error| panic!("{error}"))
+    scenario(name).model
+}
+
+/// A built-in model with its truth.
+pub fn scenario(name: &str) -> Scenario {
+    scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// A linear system with the belief it starts from.
@@ -62,7 +69,6 @@ impl System {
                 ..BeliefSettings::default()
             },
             map: None,
-            world: WorldSpec::default(),
         }
     }
 }

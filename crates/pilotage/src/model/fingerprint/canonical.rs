@@ -6,22 +6,22 @@ use super::super::*;
 use crate::digest::Digest;
 
 /// Something that is the same bytes everywhere, in every version.
-pub(super) trait Canonical {
+pub(crate) trait Canonical {
     fn write(&self, digest: &mut Digest);
 }
 
 /// The fields of a table.
-struct Fields<'a>(&'a mut Digest);
+pub(crate) struct Fields<'a>(pub &'a mut Digest);
 
 impl Fields<'_> {
-    fn field(self, name: &str, value: &(impl Canonical + ?Sized)) -> Self {
+    pub fn field(self, name: &str, value: &(impl Canonical + ?Sized)) -> Self {
         name.write(self.0);
         value.write(self.0);
         self
     }
 
     /// A field that is left out where it has its default.
-    fn unless<T: Canonical + PartialEq>(self, default: &T, name: &str, value: &T) -> Self {
+    pub fn unless<T: Canonical + PartialEq>(self, default: &T, name: &str, value: &T) -> Self {
         if value == default {
             return self;
         }
@@ -29,7 +29,7 @@ impl Fields<'_> {
     }
 
     /// A field that is left out where there is none.
-    fn given<T: Canonical>(self, name: &str, value: Option<&T>) -> Self {
+    pub fn given<T: Canonical>(self, name: &str, value: Option<&T>) -> Self {
         match value {
             Some(value) => self.field(name, value),
             None => self,
@@ -37,14 +37,14 @@ impl Fields<'_> {
     }
 
     /// A list that is left out where it is empty.
-    fn list<T: Canonical>(self, name: &str, list: &[T]) -> Self {
+    pub fn list<T: Canonical>(self, name: &str, list: &[T]) -> Self {
         if list.is_empty() {
             return self;
         }
         self.field(name, list)
     }
 
-    fn end(self) {
+    pub fn end(self) {
         "".write(self.0);
     }
 }
@@ -145,7 +145,6 @@ kinds! {
     When { Before => "before", After => "after" }
     WallBelief { Ignore => "ignore", Clip => "clip" }
     HypothesisBelief { Collapse => "collapse", Gaussian => "gaussian", Track => "track" }
-    Walls { None => "none", Clamp => "clamp" }
 }
 
 // Every field is named when a table is taken apart, so that one that is added does not compile until it is dealt with here.
@@ -168,7 +167,6 @@ impl Canonical for Model {
             episode,
             belief,
             map,
-            world: _,
         } = self;
         let actions: Vec<ActionIn<'_>> = actions
             .iter()
@@ -370,105 +368,6 @@ impl Canonical for Map {
         Fields(digest)
             .field("cell", &self.cell)
             .field("rows", &self.rows)
-            .end();
-    }
-}
-
-impl Canonical for WorldSpec {
-    fn write(&self, digest: &mut Digest) {
-        let Self {
-            kind,
-            walls,
-            start,
-            motion: WorldMotion { noise, controls },
-        } = self;
-        Fields(digest)
-            .unless(&WorldKind::default(), "kind", kind)
-            .unless(&Walls::default(), "walls", walls)
-            .given("start", start.as_ref())
-            .given("motion noise", noise.as_ref())
-            .list("controls", controls)
-            .end();
-    }
-}
-
-impl Canonical for TrueControl {
-    fn write(&self, digest: &mut Digest) {
-        let Self {
-            actions,
-            mode,
-            control,
-        } = self;
-        Fields(digest)
-            .given("actions", actions.as_ref())
-            .given("mode", mode.as_ref())
-            .field("control", control)
-            .end();
-    }
-}
-
-impl Canonical for WorldKind {
-    fn write(&self, digest: &mut Digest) {
-        match self {
-            Self::Linear => "linear".write(digest),
-            Self::CartPole(parameters) => {
-                Fields(digest).field("cart-pole", parameters).end();
-            }
-            Self::Robot(robot) => Fields(digest).field("robot", robot).end(),
-        }
-    }
-}
-
-impl Canonical for CartPole {
-    fn write(&self, digest: &mut Digest) {
-        let Self {
-            cart_mass,
-            pole_mass,
-            friction,
-            length,
-            inertia,
-            gravity,
-            step,
-            force_noise,
-        } = self;
-        Fields(digest)
-            .field("cart mass", cart_mass)
-            .field("pole mass", pole_mass)
-            .field("friction", friction)
-            .field("length", length)
-            .field("inertia", inertia)
-            .field("gravity", gravity)
-            .field("step", step)
-            .field("force noise", force_noise)
-            .end();
-    }
-}
-
-impl Canonical for Robot {
-    fn write(&self, digest: &mut Digest) {
-        let Self {
-            cell,
-            hallway,
-            radius,
-            axle,
-            speed,
-            tick,
-            slip,
-            compass_noise,
-            range_noise,
-            range,
-        } = self;
-        Fields(digest)
-            .field("cell", cell)
-            .given("hallway", hallway.as_ref())
-            .field("radius", radius)
-            .field("axle", axle)
-            .field("speed", speed)
-            .field("tick", tick)
-            .field("slip", slip)
-            .field("compass noise", compass_noise)
-            .field("range noise", range_noise)
-            .field("range", range)
             .end();
     }
 }

@@ -8,7 +8,7 @@ const CHARACTERS: &str = "`#` is blocked, `.` free, a letter, digit or `*` a mar
 const WALLED: &str = "draw `+` at every corner, `-` and `|` for walls, blanks where there is none";
 
 /// Reads a drawing with cells of side `cell`; a fault points to its row and column.
-pub(in super::super) fn draw(text: &str, cell: f64) -> Result<Map, Fault> {
+pub(crate) fn draw(text: &str, cell: f64) -> Result<Map, Fault> {
     if !(cell.is_finite() && cell > 0.0) {
         return Err(Fault::new(
             Path::new("map").key("cell"),

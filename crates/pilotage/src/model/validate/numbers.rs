@@ -24,7 +24,7 @@ pub(super) fn finite(value: f64, path: Path) -> Result<(), Fault> {
 }
 
 /// Checks that a number is finite and above 0, or not below it if `zero` is allowed.
-pub(in crate::model) fn positive(value: f64, zero: bool, path: Path) -> Result<(), Fault> {
+pub(crate) fn positive(value: f64, zero: bool, path: Path) -> Result<(), Fault> {
     finite(value, path.clone())?;
     if value > 0.0 || (zero && value == 0.0) {
         return Ok(());

@@ -62,14 +62,14 @@ impl<'a> Coding<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model;
     use crate::random::{Role, stream, uniform};
+    use crate::scenario;
     use crate::solve::arkaq::art::{Art, Rule, Settings as Network};
 
     /// Without rewards, means fall into the clusters that the network finds.
     #[test]
     fn means_fall_into_the_clusters_of_the_network() {
-        let model = model::find("maze-4x4").expect("it is built in");
+        let model = scenario::find("maze-4x4").expect("it is built in").model;
         let coding = Coding::new(&model);
         let network = Network {
             vigilance: 0.85,

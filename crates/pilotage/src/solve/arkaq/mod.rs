@@ -37,6 +37,7 @@ use crate::error::Result;
 use crate::model::{ActionId, Model};
 use crate::observe::Observer;
 use crate::policy::Automaton;
+use crate::scenario::Scenario;
 use crate::solve::learn::{Experience, critical, undiscounted};
 use crate::world::{ProblemWorld, World};
 use draft::Draft;
@@ -118,7 +119,7 @@ pub struct Point {
 /// # Errors
 /// As [`learn`].
 pub fn accepts(model: &Model, settings: &Settings) -> Result<()> {
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&Scenario::assumed(model))) };
     Task::new(model, settings.clone(), &worlds).map(drop)
 }
 

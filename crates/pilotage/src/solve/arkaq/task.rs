@@ -20,8 +20,6 @@ pub(super) struct Task<'a> {
     pub worlds: &'a Worlds<'a>,
     /// Fingerprint of the whole problem.
     pub fingerprint: Fingerprint,
-    /// Fingerprint of what is said of its world.
-    pub world: Fingerprint,
 }
 
 impl<'a> Task<'a> {
@@ -47,7 +45,6 @@ impl<'a> Task<'a> {
             settings,
             worlds,
             fingerprint: model.fingerprint(),
-            world: model.world.fingerprint(),
         })
     }
 

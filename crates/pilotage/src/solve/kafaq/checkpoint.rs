@@ -41,7 +41,6 @@ impl Task<'_> {
             solver: SOLVER,
             problem: &self.mdp.model().name,
             fingerprint: self.fingerprint,
-            world: self.world,
             settings: &self.settings,
         }
     }

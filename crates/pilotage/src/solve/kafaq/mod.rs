@@ -47,6 +47,7 @@ use crate::error::Result;
 use crate::model::{ActionId, Model};
 use crate::observe::Observer;
 use crate::policy::Automaton;
+use crate::scenario::Scenario;
 use crate::solve::learn::{Experience, Trial, critical, undiscounted};
 use crate::world::{ProblemWorld, World};
 use draft::Draft;
@@ -111,7 +112,7 @@ pub struct RegionValue {
 /// # Errors
 /// [`crate::Error::Setting`] and [`crate::Error::Unsupported`], as [`learn`].
 pub fn accepts(model: &Model, settings: &Settings) -> Result<()> {
-    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(model)) };
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&Scenario::assumed(model))) };
     Task::new(model, settings.clone(), &worlds).map(drop)
 }
 

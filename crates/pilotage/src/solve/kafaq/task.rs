@@ -26,8 +26,6 @@ pub(super) struct Task<'a> {
     pub chain: Vec<LevelId>,
     /// Fingerprint of the whole problem.
     pub fingerprint: Fingerprint,
-    /// Fingerprint of what is said of its world.
-    pub world: Fingerprint,
 }
 
 impl<'a> Task<'a> {
@@ -84,7 +82,6 @@ impl<'a> Task<'a> {
             worlds,
             chain,
             fingerprint,
-            world: model.world.fingerprint(),
         })
     }
 

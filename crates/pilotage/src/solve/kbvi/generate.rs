@@ -10,6 +10,7 @@ use crate::model::ActionId;
 use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::{Automaton, Matching, Policy};
+use crate::scenario::Scenario;
 use crate::simulate::{FilterAgent, run_episode};
 use crate::solve::SolverKind;
 use crate::solve::compile::annotate;
@@ -153,7 +154,7 @@ fn run_once(planner: &Branches, settings: &Settings, run: u64) -> Vec<(Belief, A
     let mut draws = Draws::new(settings.seed, run);
     let length = (horizon + 1).min(model.episode.length);
     run_episode(
-        &mut ProblemWorld::new(model),
+        &mut ProblemWorld::new(&Scenario::assumed(model)),
         &mut agent,
         &mut draws,
         &mut observation,

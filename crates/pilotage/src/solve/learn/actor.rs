@@ -1,7 +1,7 @@
 //! An agent that acts: a world, the belief about it, and the part of a model that it is told.
 
 use crate::belief::{Belief, Filter};
-use crate::model::{ActionId, Model, Then, WorldSpec};
+use crate::model::{ActionId, Model, Then};
 use crate::solve::learn::Worlds;
 use crate::world::{Draws, Step, World};
 
@@ -59,7 +59,6 @@ pub fn known(model: &Model) -> Model {
         events: Vec::new(),
         cost: None,
         map: None,
-        world: WorldSpec::default(),
         ..model.clone()
     }
 }

@@ -22,7 +22,6 @@ struct Header<S> {
     solver: String,
     problem: String,
     fingerprint: Fingerprint,
-    world: Fingerprint,
     settings: S,
     checksum: String,
 }
@@ -33,8 +32,6 @@ pub struct Owner<'a, S> {
     pub problem: &'a str,
     /// Fingerprint of the problem.
     pub fingerprint: Fingerprint,
-    /// Fingerprint of what is said of its world, from which a learner learns.
-    pub world: Fingerprint,
     pub settings: &'a S,
 }
 
@@ -52,7 +49,6 @@ impl<S: Clone + PartialEq + Serialize + DeserializeOwned> Owner<'_, S> {
             solver: self.solver.to_owned(),
             problem: self.problem.to_owned(),
             fingerprint: self.fingerprint,
-            world: self.world,
             settings: self.settings.clone(),
             checksum: Digest::of(&state).to_string(),
         };
@@ -118,12 +114,6 @@ impl<S: Clone + PartialEq + Serialize + DeserializeOwned> Owner<'_, S> {
         if header.fingerprint != self.fingerprint {
             return Err(format!(
                 "{} has changed since this checkpoint was written; delete it to start afresh",
-                self.problem
-            ));
-        }
-        if header.world != self.world {
-            return Err(format!(
-                "the world of {} has changed since this checkpoint was written; delete it to start afresh",
                 self.problem
             ));
         }

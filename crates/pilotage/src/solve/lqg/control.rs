@@ -8,6 +8,7 @@ use crate::belief::kalman::Correction;
 use crate::error::{Error, Result};
 use crate::model::{Model, QuadraticCost};
 use crate::observe::Observer;
+use crate::scenario::{Scenario, Simulator, Walls};
 use crate::simulate::{Episode, Evaluation, Options, run_all, summarise};
 use crate::world::{Draws, Noise, ProblemWorld, World};
 
@@ -95,20 +96,37 @@ impl Controller {
         self.gains.get(time)
     }
 
-    /// Runs the controller in the model's linear world. The same numbers for any number of threads.
-    pub fn evaluate(&self, options: Options, observer: &dyn Observer) -> Evaluation {
+    /// Runs the controller in a linear world without walls. The same numbers for any number of threads.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for any other world: its steps know no free control.
+    pub fn evaluate(
+        &self,
+        scenario: &Scenario,
+        options: Options,
+        observer: &dyn Observer,
+    ) -> Result<Evaluation> {
+        let truth = &scenario.truth;
+        let linear = truth.simulator == Simulator::Linear && truth.motion == Default::default();
+        if !linear || truth.walls != Walls::None {
+            return Err(Error::Unsupported {
+                solver: "lqg",
+                model: self.model.name.clone(),
+                reason: "a free control can be tried in the linear world that the model assumes, without walls; add `episode.alive` or a [[reward]] to steer by the actions, or set `world.walls` to \"none\"".to_owned(),
+            });
+        }
         let noise = (
             Noise::new(&self.model.motion.noise),
             Noise::new(&self.model.sensor.noise),
         );
-        summarise(&run_all(options, observer, &|| {
-            let mut world = ProblemWorld::new(&self.model);
+        Ok(summarise(&run_all(options, observer, &|| {
+            let mut world = ProblemWorld::new(scenario);
             let noise = &noise;
             Box::new(move |episode| {
                 let mut draws = Draws::new(options.seed, episode);
                 self.run(&mut world, noise, &mut draws)
             })
-        }))
+        })))
     }
 
     /// One episode. The world is asked for its start only: its own steps know no free control.

@@ -21,7 +21,7 @@ use nalgebra::DMatrix;
 
 use crate::belief::kalman::symmetric;
 use crate::error::{Error, Result};
-use crate::model::{Interval, Model, Walls, WorldKind};
+use crate::model::{Interval, Model};
 
 /// Which of its two uses a model is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,12 +38,6 @@ pub fn use_of(model: &Model) -> std::result::Result<Use, String> {
     let fails = model.episode.alive.sides.iter().any(limited);
     let pays = !model.rewards.is_empty() || !model.events.is_empty() || fails;
     match (&model.cost, pays) {
-        (Some(_), false) if model.world.kind != WorldKind::Linear => Err(
-            "its cost has a closed form in a linear world only; add `episode.alive` or a [[reward]] to steer by its actions".to_owned(),
-        ),
-        (Some(_), false) if model.world.walls != Walls::None => Err(
-            "its cost has a closed form in a world without walls only; set `world.walls` to \"none\"".to_owned(),
-        ),
         (Some(_), false) => Ok(Use::Control),
         (Some(_), true) => Ok(Use::Actions),
         (None, _) if fails => Ok(Use::Actions),

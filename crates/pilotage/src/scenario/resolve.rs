@@ -2,17 +2,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::error::{Fault, Path};
 use super::file::{
     ActionTable, ControlTable, EventTable, Kind, ModelFile, Plant, RewardTable, Rows, StartTable,
     StateTable, WorldMotionTable,
 };
 use super::file_value::{Ends, OneOrMany, Sides, Where};
-use super::validate::check_names;
 use super::*;
+use crate::model::error::{Fault, Path};
+use crate::model::map::{self, Map};
+use crate::model::validate::check_names;
+use crate::model::*;
 
-/// Builds the model and validates it; faults are placed where the file says the thing.
-pub(super) fn resolve(file: ModelFile) -> Result<Model, Fault> {
+/// Builds the scenario and validates it; faults are placed where the file says the thing.
+pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
     if file.discount == 1.0 && file.episode.length.is_none() {
         return Err(Fault::new(
             Path::new("discount"),
@@ -50,6 +52,15 @@ pub(super) fn resolve(file: ModelFile) -> Result<Model, Fault> {
         names.events(table, path)
     })?;
     let controls = motion.b.ncols();
+    let truth = Truth {
+        simulator: simulator(&file)?,
+        walls: file.world.walls,
+        start: match &file.world.start {
+            Some(start) => Some(names.start(start, Path::new("world").key("start"))?),
+            None => None,
+        },
+        motion: names.true_motion(&file.world.motion)?,
+    };
     let model = Model {
         state: state_variables(&file.state, map.as_ref())?,
         start: names.start(&file.start, Path::new("start"))?,
@@ -73,26 +84,18 @@ pub(super) fn resolve(file: ModelFile) -> Result<Model, Fault> {
         episode: episode(&file, &names)?,
         belief: belief(&file),
         map,
-        world: WorldSpec {
-            kind: world_kind(&file)?,
-            walls: file.world.walls,
-            start: match &file.world.start {
-                Some(start) => Some(names.start(start, Path::new("world").key("start"))?),
-                None => None,
-            },
-            motion: names.world_motion(&file.world.motion)?,
-        },
         modes: names.modes,
         name: file.name,
         about: file.about,
         discount: file.discount,
     };
-    model.validate().map_err(|mut fault| {
+    let scenario = Scenario { model, truth };
+    scenario.validate().map_err(|mut fault| {
         fault.path.renumber("reward", &reward_lines);
         fault.path.renumber("event", &event_lines);
         fault
     })?;
-    Ok(model)
+    Ok(scenario)
 }
 
 /// The names that a file declares and its other tables refer to.
@@ -316,9 +319,9 @@ impl Names {
         })
     }
 
-    fn world_motion(&self, table: &Option<WorldMotionTable>) -> Result<WorldMotion, Fault> {
+    fn true_motion(&self, table: &Option<WorldMotionTable>) -> Result<TrueMotion, Fault> {
         let Some(table) = table else {
-            return Ok(WorldMotion::default());
+            return Ok(TrueMotion::default());
         };
         let path = Path::new("world").key("motion");
         let control = |(i, table): (usize, &ControlTable)| {
@@ -329,7 +332,7 @@ impl Names {
                 control: DVector::from_column_slice(&table.u),
             })
         };
-        Ok(WorldMotion {
+        Ok(TrueMotion {
             noise: optional_matrix(&table.noise, path.clone().key("noise"))?,
             controls: table
                 .control
@@ -536,10 +539,10 @@ fn saturating(count: u64) -> usize {
     usize::try_from(count).unwrap_or(usize::MAX)
 }
 
-fn world_kind(file: &ModelFile) -> Result<WorldKind, Fault> {
+fn simulator(file: &ModelFile) -> Result<Simulator, Fault> {
     let path = Path::new("world");
     match (file.world.kind, &file.world.robot) {
-        (Kind::Robot, Some(robot)) => return Ok(WorldKind::Robot(robot.clone())),
+        (Kind::Robot, Some(robot)) => return Ok(Simulator::Robot(robot.clone())),
         (Kind::Robot, None) => {
             return Err(Fault::new(
                 path.key("kind"),
@@ -557,13 +560,13 @@ fn world_kind(file: &ModelFile) -> Result<WorldKind, Fault> {
         (_, None) => {}
     }
     match (file.world.kind, &file.world.cart_pole) {
-        (Kind::CartPole, Some(parameters)) => Ok(WorldKind::CartPole(parameters.clone())),
+        (Kind::CartPole, Some(parameters)) => Ok(Simulator::CartPole(parameters.clone())),
         (Kind::CartPole, None) => Err(no_cart_pole(path.key("kind"))),
         (Kind::Linear, Some(_)) if file.motion.linearise.is_none() => Err(Fault::of_key(
             path.key("cart-pole"),
             "nothing uses these parameters",
             "add `kind = \"cart-pole\"` to [world], or delete this table",
         )),
-        (Kind::Linear | Kind::Robot, _) => Ok(WorldKind::Linear),
+        (Kind::Linear | Kind::Robot, _) => Ok(Simulator::Linear),
     }
 }

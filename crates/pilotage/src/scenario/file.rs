@@ -5,7 +5,8 @@ use schemars::{JsonSchema, Schema};
 use serde::Deserialize;
 
 use super::file_value::{Ends, Named, OneOrMany, Sides, Where};
-use super::{CartPole, HypothesisBelief, Robot, Then, WallBelief, Walls, When};
+use super::{CartPole, Robot, Walls};
+use crate::model::{HypothesisBelief, Then, WallBelief, When};
 
 /// Rows of numbers: `[[1.0, 0.0], [0.0, 1.0]]`.
 pub(super) type Rows = Vec<Vec<f64>>;

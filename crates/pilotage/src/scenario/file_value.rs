@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
-use super::Interval;
+use crate::model::Interval;
 
 /// Ends of an interval for some of the state variables, by name. The low end belongs to it, the high end does not;
 /// `-inf` and `inf` leave a side open.

@@ -4,31 +4,31 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::error::{Fault, ModelError, Place, suggest};
+use super::Scenario;
 use super::file::ModelFile;
 use super::locate::locate;
 use super::resolve::resolve;
-use super::{Model, error};
+use crate::model::{Fault, ModelError, Place, error, suggest};
 
 /// Version of the file format that [`read`] reads.
 const FORMAT: u64 = 1;
 
-/// Reads a model from the text of a model file; `origin` says in errors where the text is from.
+/// Reads a scenario from the text of a model file; `origin` says in errors where the text is from.
 ///
 /// # Errors
 /// If the text is not TOML, has a key that the format does not have (see [`schema`](super::schema)) or describes a model
-/// that is not valid (see [`Model::validate`]): with line, column and a hint.
+/// that is not valid (see [`Scenario::validate`]): with line, column and a hint.
 ///
 /// ```
-/// let text = pilotage::model::builtin("corridor").ok_or("no corridor")?;
+/// let text = pilotage::scenario::builtin("corridor").ok_or("no corridor")?;
 /// let mistaken = text.replace("discount = 0.75", "discount = 1.75");
-/// let error = pilotage::model::read(&mistaken, "my-corridor.toml").expect_err("a discount above 1");
+/// let error = pilotage::scenario::read(&mistaken, "my-corridor.toml").expect_err("a discount above 1");
 /// assert!(error.to_string().starts_with("my-corridor.toml:"));
 /// assert!(error.message.contains("1.75"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn read(text: &str, origin: &str) -> Result<Model, ModelError> {
-    let parse = || -> Result<Model, (std::ops::Range<usize>, String, String)> {
+pub fn read(text: &str, origin: &str) -> Result<Scenario, ModelError> {
+    let parse = || -> Result<Scenario, (std::ops::Range<usize>, String, String)> {
         check_format(text).map_err(|fault| placed(text, fault))?;
         let file = toml::de::Deserializer::parse(text)
             .and_then(ModelFile::deserialize)
@@ -48,7 +48,7 @@ pub fn read(text: &str, origin: &str) -> Result<Model, ModelError> {
 ///
 /// # Errors
 /// If the file cannot be opened, is not UTF-8 text, or is not a valid model; see [`read`].
-pub fn load(path: &Path) -> Result<Model, ModelError> {
+pub fn load(path: &Path) -> Result<Scenario, ModelError> {
     let origin = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|error| ModelError {
         origin: origin.as_str().into(),

@@ -1,11 +1,11 @@
-//! From a [`Path`](super::Path) to the bytes of a text where it stands.
+//! From a [`Path`](crate::model::Path) to the bytes of a text where it stands.
 
 use std::ops::Range;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Fault, Step};
+use crate::model::{Fault, Step};
 
 /// The bytes of `text` that a fault is about; those of the nearest table or list around it when it is not written there.
 pub(super) fn locate(text: &str, fault: &Fault) -> Range<usize> {

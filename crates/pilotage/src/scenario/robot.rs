@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::error::{Fault, Path};
-use super::validate::positive;
-use super::{Interval, Model, StartShape};
+use super::Scenario;
+use crate::model::validate::positive;
+use crate::model::{Fault, Interval, Model, Path, StartShape};
 
 /// A two-wheeled robot with a range finder at the middle of each of its four sides (thesis 4.3), and its arena. The arena has walls
 /// at `state.bounds`; positions are measured in units of state, everything else in metres, seconds and radians.
@@ -53,7 +53,7 @@ impl Robot {
     }
 
     /// Checks the numbers, and that the robot of `model` fits its arena and starts clear of its walls.
-    pub(super) fn validate(&self, model: &Model) -> Result<(), Fault> {
+    pub(super) fn validate(&self, scenario: &Scenario) -> Result<(), Fault> {
         let path = |key: &str| Path::new("world").key("robot").key(key);
         for (key, value, zero) in [
             ("cell", self.cell, false),
@@ -82,9 +82,9 @@ impl Robot {
                 "give at most twice the radius",
             ));
         }
-        self.check_model(model)?;
-        self.check_room(model, path)?;
-        self.check_starts(model)
+        self.check_model(&scenario.model)?;
+        self.check_room(&scenario.model, path)?;
+        self.check_starts(scenario)
     }
 
     /// The robot senses its place, and actions move it.
@@ -156,8 +156,9 @@ impl Robot {
         Ok(())
     }
 
-    fn check_starts(&self, model: &Model) -> Result<(), Fault> {
-        let (starts, path) = match &model.world.start {
+    fn check_starts(&self, scenario: &Scenario) -> Result<(), Fault> {
+        let model = &scenario.model;
+        let (starts, path) = match &scenario.truth.start {
             Some(starts) => (starts, Path::new("world").key("start")),
             None => (&model.start, Path::new("start")),
         };

@@ -1,7 +1,7 @@
 //! The models that are compiled in.
 
-use super::error::suggest;
-use super::{Model, ModelError, load, read};
+use super::{Scenario, load, read};
+use crate::model::{ModelError, suggest};
 
 macro_rules! models {
     ($($name:literal),* $(,)?) => {
@@ -55,7 +55,7 @@ pub fn builtin(name: &str) -> Option<&'static str> {
 ///
 /// # Errors
 /// If neither exists, with the nearest built-in name as a hint, or if the file is not a valid model.
-pub fn find(name_or_path: &str) -> Result<Model, ModelError> {
+pub fn find(name_or_path: &str) -> Result<Scenario, ModelError> {
     if let Some(text) = builtin(name_or_path) {
         return read(text, name_or_path);
     }
