@@ -9,7 +9,7 @@ pub mod mdp;
 pub mod recall;
 pub mod riccati;
 
-pub use filter::{Belief, Filter, Switch};
+pub use filter::{Belief, Filter, LARGEST, Switch};
 pub use hypotheses::{Hypothesis, Merge, Tracker, Tracking};
 pub use kalman::{Correction, KalmanFilter};
 pub use levels::{ClassId, LevelGraph, LevelId};

@@ -2,14 +2,19 @@
 
 mod automaton;
 mod builder;
+mod check;
 mod components;
 mod controller;
+mod convert;
 mod coordinates;
+mod file;
+mod layout;
 mod store;
 
 pub use automaton::{Automaton, Matching, Node, NodeId, Observed, Place};
 pub use controller::Controller;
 pub use coordinates::{Coordinates, MOST_COORDINATES};
+pub use file::schema;
 pub use store::write_whole;
 
 use crate::belief::Belief;
