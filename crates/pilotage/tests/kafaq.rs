@@ -500,8 +500,5 @@ fn a_pole_is_balanced_by_a_few_regions_of_its_own_motion() {
     let json = learned.automaton.to_json().unwrap();
     let read = Automaton::from_json(&json, "x").unwrap();
     assert_eq!(read, learned.automaton);
-    assert!(
-        json.contains("{\"name\": \"mode 1.118\", \"vector\": ["),
-        "{json}"
-    );
+    assert!(json.contains("\"mode 1.118\""), "{json}");
 }

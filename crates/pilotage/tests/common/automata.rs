@@ -3,13 +3,14 @@
 use pilotage::belief::{BeliefMdp, Clusters, Recall};
 use pilotage::model::Model;
 use pilotage::policy::{Automaton, Coordinates, Matching, Node, Observed, Place};
+use pilotage::scenario::{self, Scenario};
 use proptest::prelude::*;
 use serde_json::Value;
 
 use super::built_in;
 
 /// Problems with one to four variables, with and without modes, walls and a map.
-const PROBLEMS: [&str; 8] = [
+const PROBLEMS: [&str; 9] = [
     "corridor",
     "corridor-walls",
     "tiger",
@@ -18,10 +19,76 @@ const PROBLEMS: [&str; 8] = [
     "u-maze",
     "shuttle",
     "cart-pole",
+    THIN_WALLS,
 ];
 
+/// The problem that [`thin_walls`] is.
+pub const THIN_WALLS: &str = "thin-walls";
+
+/// A maze with thin walls and blocked cells, and a variable beside its map.
+pub fn thin_walls() -> Scenario {
+    let text = r#"
+format = 1
+name = "thin-walls"
+discount = 0.9
+
+[state]
+names = ["x", "y", "height"]
+bounds = [[0.0, 1.6], [0.0, 1.2], [-1.0, 1.0]]
+
+[start]
+mean = [0.2, 0.2, 0.0]
+covariance = [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]
+
+[motion]
+A = [[1.0, 0.0, 0.1], [0.0, 1.0, 0.0], [0.0, 0.0, 0.9]]
+noise = [[0.05, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, 0.0, 0.05]]
+
+[sensor]
+noise = [[0.05, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, 0.0, 0.05]]
+
+[actions]
+NORTH = { u = [0.0, 0.3, 0.0] }
+EAST = { u = [0.3, 0.0, 0.2] }
+SOUTH = { u = [0.0, -0.3, 0.0] }
+WEST = { u = [-0.3, 0.0, -0.2], sensor_noise = [[0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.2]] }
+
+[[reward]]
+in = "*"
+value = 1.0
+
+[belief]
+walls = "clip"
+level_tolerance = 5e-3
+
+[map]
+cell = 0.4
+rows = '''
++--+--+--+--+
+|  |     | *|
++  +  +--+  +
+|     |##|  |
++--+  +  +  +
+|  |     |  |
++--+--+--+--+
+'''
+
+[world]
+walls = "clamp"
+"#;
+    scenario::read(text, "thin-walls.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A problem of [`PROBLEMS`].
+fn problem(name: &str) -> Model {
+    match name {
+        THIN_WALLS => thin_walls().model,
+        name => built_in(name),
+    }
+}
+
 pub fn empty(name: &str, matching: Matching) -> Automaton {
-    Automaton::new(&BeliefMdp::new(&built_in(name)), "test", matching)
+    Automaton::new(&BeliefMdp::new(&problem(name)), "test", matching)
 }
 
 /// An automaton with one node, all of whose numbers are known.
@@ -134,7 +201,7 @@ pub fn any_automaton(
     let vectors = proptest::collection::vec(proptest::collection::vec(-2.0..2.0_f64, 4), 0..4);
     (name, matching, memory, nodes, scale, vectors).prop_map(
         |(name, matching, memory, nodes, scale, vectors)| {
-            let model = built_in(name);
+            let model = problem(name);
             let mut automaton = empty(name, matching);
             let bounded = model.state.iter().all(|v| v.bounds.width().is_finite());
             if memory == Memory::Recall && bounded {
