@@ -89,7 +89,7 @@ fn measure(name: &str, seeds: u64) -> Measured {
     let scenario = scenario::find(name).unwrap();
     let robot = ON_ROBOT
         .contains(&name)
-        .then(|| scenario::find(&format!("robot-{name}")).unwrap());
+        .then(|| scenario::find(format!("robot-{name}")).unwrap());
     let baselines =
         baselines(&scenario, &closed::Settings::default(), EVALUATION, &Silent).unwrap();
     let runs = (1..=seeds)

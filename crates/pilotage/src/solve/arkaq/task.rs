@@ -3,7 +3,7 @@
 use super::settings::Settings;
 use crate::belief::{BeliefMdp, Filter};
 use crate::error::{Error, Result};
-use crate::model::Model;
+use crate::model::{Fingerprint, Model};
 use crate::policy::Automaton;
 use crate::solve::learn::{Trial, Worlds, known, run_trial};
 
@@ -19,7 +19,7 @@ pub(super) struct Task<'a> {
     pub settings: Settings,
     pub worlds: &'a Worlds<'a>,
     /// Fingerprint of the whole problem.
-    pub fingerprint: u64,
+    pub fingerprint: Fingerprint,
 }
 
 impl<'a> Task<'a> {
