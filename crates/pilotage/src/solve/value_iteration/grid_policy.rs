@@ -54,7 +54,7 @@ pub struct GridPolicy {
 /// Plans by value iteration, for the length of an episode where that matters (see [`super::horizon`]).
 ///
 /// # Errors
-/// [`Error::TooLarge`] where the grid does not fit the memory allowed, [`Error::Setting`] for settings out of range,
+/// [`Error::TooLarge`] and [`Error::OutOfMemory`] where the grid does not fit the memory, [`Error::Setting`] for settings out of range,
 /// [`Error::Unsupported`] where the grid does not see what is paid, [`Error::NotFinite`] where numbers grow beyond all bounds.
 pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> Result<GridPolicy> {
     settings.validate()?;
