@@ -15,7 +15,7 @@
 //! iterating.
 
 use nalgebra::DMatrix;
-use petgraph::algo::tarjan_scc;
+use petgraph::algo::kosaraju_scc;
 use petgraph::graph::{DiGraph, NodeIndex};
 
 use super::extent::{axes, knows_map, mebibytes};
@@ -116,7 +116,8 @@ fn groups_of_levels(mdp: &BeliefMdp) -> Vec<Vec<LevelId>> {
         group.sort_unstable();
         group
     };
-    let groups = tarjan_scc(&graph).into_iter().map(group);
+    // Not Tarjan's: that one recurses, and levels that lead to each other in a long line would overflow the stack.
+    let groups = kosaraju_scc(&graph).into_iter().map(group);
     groups
         .filter(|group| !group.iter().any(|level| levels.is_over(*level)))
         .collect()
