@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use pilotage::policy::{check_writable, write_whole};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Estimate;
+use pilotage::solve::bound;
 use pilotage::solve::{Earned, Entry, Form, Registry, Request, Solution, Solver, solve};
 use pilotage_report::{returns_svg, values_svg};
 use serde_json::json;
@@ -35,6 +36,9 @@ pub struct Arguments {
     /// Measure what compiling the planner into an automaton cost, over the same episodes.
     #[arg(long)]
     value_lost: bool,
+    /// Find an upper bound on what any policy can earn where the model holds.
+    #[arg(long)]
+    bound: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -315,7 +319,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let curves = arguments.learner.draw(&solution)?;
     let clock = Instant::now();
-    let earned = solution.earned(&scenario, arguments.evaluation.options(), &bars)?;
+    let mut earned = solution.earned(&scenario, arguments.evaluation.options(), &bars)?;
     earned.check()?;
     let seconds = (solve_seconds, clock.elapsed().as_secs_f64());
     let lost = arguments
@@ -323,9 +327,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .then(|| value_lost(arguments, solver, &scenario, &request, &solution, &bars))
         .transpose()?;
 
+    let bound = arguments.bound.then(|| {
+        let settings = bound::Settings::default();
+        bound::bound(&scenario.model, &settings, &bars)
+    });
+    if let Some(Err(error)) = &bound {
+        earned.remarks.push(format!("no upper bound: {error}"));
+    }
+    let bound = bound.and_then(Result::ok);
+
     let mut out = std::io::stdout().lock();
     if arguments.json {
         let mut report = report(arguments, &scenario, solver, &solution, &earned, seconds);
+        if let Some(bound) = &bound {
+            report["upper_bound"] = json!({ "mean": bound.mean, "stderr": bound.stderr });
+        }
         if let Some(lost) = lost {
             report["value_lost"] = json!(lost);
         }
@@ -336,6 +352,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "{}",
             shown(arguments, &scenario, solver, &solution, &earned, seconds)
         )?;
+        if let Some(bound) = &bound {
+            writeln!(
+                out,
+                "{}",
+                summary::bound(bound, earned.assumed.discounted.mean)
+            )?;
+        }
         if let Some(lost) = lost {
             writeln!(
                 out,

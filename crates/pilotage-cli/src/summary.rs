@@ -7,6 +7,7 @@ use comfy_table::{CellAlignment, Table};
 use pilotage::policy::{Automaton, Place};
 use pilotage::simulate::{Estimate, Evaluation};
 use pilotage::solve::Earned;
+use pilotage::solve::bound::Bound;
 
 /// Rows of a node table that are shown before it is cut.
 const ROWS: usize = 24;
@@ -53,6 +54,18 @@ pub fn earned(earned: &Earned, planned: Option<f64>, as_assumed: bool) -> String
         estimate(&earned.world.discounted)
     );
     text + &rest(&earned.world)
+}
+
+/// The most that any policy can earn, and how far what is earned where the model holds lies below it.
+pub fn bound(bound: &Bound, earned: f64) -> String {
+    let gap = bound.gap(earned).map_or(String::new(), |gap| {
+        format!(", {:.1} % above", 100.0 * gap.max(0.0))
+    });
+    format!(
+        "  at most              {:.4}{gap}\n                       {}",
+        bound.mean,
+        bound.method.describe()
+    )
 }
 
 fn planned_line(planned: Option<f64>) -> String {

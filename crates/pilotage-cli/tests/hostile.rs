@@ -268,10 +268,22 @@ fn extreme_settings_are_refused_by_name() {
     let rows: &[(&[&str], &str)] = &[
         (&["--threads", "100000"], "at most 1024"),
         (&["--threads", MAX], "at most 1024"),
-        (&["--effort", "nan"], "above 0, at most 1000"),
-        (&["--effort", "0"], "above 0, at most 1000"),
-        (&["--effort", "inf"], "above 0, at most 1000"),
-        (&["--effort", "1e300"], "above 0, at most 1000"),
+        (
+            &["--with", "policy-search", "--effort", "nan"],
+            "above 0, at most 1000",
+        ),
+        (
+            &["--with", "policy-search", "--effort", "0"],
+            "above 0, at most 1000",
+        ),
+        (
+            &["--with", "policy-search", "--effort", "inf"],
+            "above 0, at most 1000",
+        ),
+        (
+            &["--with", "policy-search", "--effort", "1e300"],
+            "above 0, at most 1000",
+        ),
         (&["--grid", "0"], "points = 0 is out of range"),
         (&["--grid", "1"], "points = 1 is out of range"),
         (

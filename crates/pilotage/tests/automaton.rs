@@ -446,10 +446,11 @@ proptest! {
                         "{:?} at {}, borders {:?}", matching, mean, inside);
                 }
             }
-            // A segment for every interval; a point for every interval, or two for every border.
+            // A segment for every interval; a point for every interval, or two for every border. Borders beside the way count too.
+            let borders = pieces.borders.len();
             let most = match matching {
-                Matching::Segments => inside.len() + 1,
-                Matching::Nearest => (inside.len() + 1).max(2 * inside.len()),
+                Matching::Segments => borders + 1,
+                Matching::Nearest => (borders + 1).max(2 * borders),
             };
             prop_assert!(automaton.nodes.len() <= most);
         }

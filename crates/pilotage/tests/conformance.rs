@@ -230,6 +230,7 @@ fn every_model_has_a_solver_and_every_solver_a_model() {
     for (name, expected) in [
         ("corridor", "value-iteration"),
         ("cart-pole", "policy-search"),
+        ("scalar-lqg", "value-iteration"),
     ] {
         assert_eq!(first(&scenario::find(name).unwrap().model), expected);
     }
@@ -332,7 +333,7 @@ fn uncertainty_that_grows_for_ever_is_refused_with_its_direction() {
     // Detectable: sensed, or dying out by itself.
     for scenario in [with_drift(1.2, 1.0, 0.1), with_drift(0.9, 0.0, 0.1)] {
         let grid = Settings {
-            points: Some(25),
+            points: Some(31),
             ..Settings::default()
         };
         plan(&Mls { grid }, &scenario.model, &short(Form::Grid), &Silent).unwrap();

@@ -80,7 +80,7 @@ fn solving_and_evaluating_do_not_depend_on_threads() {
     for (name, points, matching) in [
         ("corridor", 201, Matching::Nearest),
         ("tiger", 201, Matching::Segments),
-        ("maze-2d", 21, Matching::Nearest),
+        ("maze-2d", 31, Matching::Nearest),
     ] {
         let alone = with_threads(1, || solved(name, points, matching));
         let together = with_threads(5, || solved(name, points, matching));

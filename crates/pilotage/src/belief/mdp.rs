@@ -218,28 +218,40 @@ impl BeliefMdp {
         self.stop(mean, moved)
     }
 
-    /// Probability that the true state leaves what [`crate::model::Episode::alive`] allows in the step that an action takes, of an agent
-    /// that has not failed: now the state is within all limits, and the filter does not know it.
+    /// Probability that the true state is within what [`crate::model::Episode::alive`] allows.
+    pub fn alive(&self, level: LevelId, mean: &[f64]) -> f64 {
+        let alive = &self.model.episode.alive;
+        if alive.sides.is_empty() {
+            return 1.0;
+        }
+        self.probability(level, mean, alive)
+    }
+
+    /// How an agent that has not failed gets through the step that an action takes: now the state is within all limits, and the filter
+    /// does not know it.
     ///
     /// Counting the probability of being outside afresh at every step would count the same error of the estimate over and over.
-    pub fn failure(&self, level: LevelId, mean: &[f64], action: ActionId) -> f64 {
+    pub fn survival(&self, level: LevelId, mean: &[f64], action: ActionId) -> Survival {
         let alive = &self.model.episode.alive;
         if alive.sides.is_empty() || self.model.actions[action].then != Then::Continue {
-            return 0.0;
+            return Survival::SURE;
         }
         let (a, covariance) = (&self.model.motion.a, self.levels.covariance(level));
         let step = self.levels.step(level, self.levels.class_of(action));
         let predicted = self.predicted(mean, action);
         let carried = a * covariance;
-        let stays = alive.sides.iter().map(|&(i, side)| {
+        let sides = alive.sides.iter().map(|&(i, side)| {
             let later = (predicted[i], step.correction.predicted[(i, i)]);
-            stays((mean[i], covariance[(i, i)]), later, carried[(i, i)], side)
+            survival((mean[i], covariance[(i, i)]), later, carried[(i, i)], side)
         });
-        1.0 - stays.product::<f64>()
+        sides.fold(Survival::SURE, |all, one| Survival {
+            probability: all.probability * one.probability,
+            odds: all.odds * one.odds,
+        })
     }
 
     /// Expected immediate reward `r(b, a)`, events included, and what the action can do to mode and episode. The reward of failing is
-    /// not counted, see [`BeliefMdp::failure`].
+    /// not counted, see [`BeliefMdp::survival`].
     pub fn step(
         &self,
         mode: ModeId,
@@ -433,23 +445,41 @@ fn moments(model: &Model) -> (DVector<f64>, DMatrix<f64>) {
     (mean, covariance)
 }
 
-/// Probability that a variable is within limits a step later, given that it is now. Mean and variance now and later, and the covariance
-/// of the two.
-fn stays(now: (f64, f64), later: (f64, f64), shared: f64, side: Interval) -> f64 {
+/// How someone who is alive gets through a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Survival {
+    /// Probability of being within the limits afterwards.
+    pub probability: f64,
+    /// How much more likely that is than for the belief itself, which does not know that its agent is alive: what is known of the next
+    /// belief, [`BeliefMdp::alive`], counts so many times.
+    pub odds: f64,
+}
+
+impl Survival {
+    /// No limits.
+    const SURE: Self = Self {
+        probability: 1.0,
+        odds: 1.0,
+    };
+}
+
+/// Survival along a variable with limits: mean and variance now and later, and the covariance of the two.
+fn survival(now: (f64, f64), later: (f64, f64), shared: f64, side: Interval) -> Survival {
     // So many standard deviations inside its limits a variable leaves them less often than once in 1e11 steps.
     const NEVER: f64 = 6.7;
     // Less likely than this an agent is not there to ask.
     const HARDLY: f64 = 1e-9;
-    let inside = |(mean, variance): (f64, f64)| {
-        let reach = NEVER * f64::sqrt(variance);
-        mean - side.low > reach && side.high - mean > reach
-    };
-    if inside(later) {
-        return 1.0;
+    let reach = NEVER * later.1.sqrt();
+    if later.0 - side.low > reach && side.high - later.0 > reach {
+        return Survival::SURE;
     }
-    let alive = interval_probability(now.0, now.1, side);
-    if alive < HARDLY {
-        return 0.0;
+    let inside = |(mean, variance)| interval_probability(mean, variance, side);
+    let (alive, stays) = (inside(now), inside(later));
+    if alive < HARDLY || stays < HARDLY {
+        return Survival {
+            probability: 0.0,
+            odds: 0.0,
+        };
     }
     let joint = DMatrix::from_row_slice(2, 2, &[now.1, shared, shared, later.1]);
     let both = region_probability(
@@ -457,5 +487,9 @@ fn stays(now: (f64, f64), later: (f64, f64), shared: f64, side: Interval) -> f64
         &joint,
         &Region::new(vec![(0, side), (1, side)]),
     );
-    (both / alive).clamp(0.0, 1.0)
+    let probability = (both / alive).clamp(0.0, 1.0);
+    Survival {
+        probability,
+        odds: probability / stays,
+    }
 }

@@ -15,5 +15,5 @@ pub use filter::{Belief, Filter, Switch};
 pub use hypotheses::{Hypothesis, Merge, Tracker, Tracking};
 pub use kalman::{Correction, KalmanFilter};
 pub use levels::{ClassId, LevelGraph, LevelId};
-pub use mdp::BeliefMdp;
+pub use mdp::{BeliefMdp, Survival};
 pub use recall::{ClusterId, Clusters, Recall};

@@ -147,7 +147,7 @@ pub fn least_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
 pub fn small(entry: &Entry, model: &Model) -> Solver {
     let points = match model.state_dim() {
         1 => "161",
-        2 => "25",
+        2 => "31",
         _ => "3",
     };
     let settings = [

@@ -213,7 +213,8 @@ fn starts(model: &Model) -> Result<Vec<Start>, String> {
     model.start.iter().map(start).collect()
 }
 
-fn cuts(model: &Model, axis: usize) -> Vec<f64> {
+/// Ends of the sides of all regions along an axis, rising.
+pub(super) fn cuts(model: &Model, axis: usize) -> Vec<f64> {
     let rewards = model.rewards.iter().map(|reward| &reward.region);
     let events = model.events.iter().map(|event| &event.region);
     let regions = rewards.chain(events).chain([&model.episode.alive]);

@@ -42,7 +42,7 @@ impl Law {
         let share = if width > 0.0 {
             (plus(at - self.low, self.sd) - plus(at - self.high, self.sd)) / width
         } else if self.sd > 0.0 {
-            normal_cdf((at - self.low) / self.sd)
+            cdf((at - self.low) / self.sd)
         } else {
             f64::from(self.low < at)
         };
@@ -91,13 +91,26 @@ impl Law {
     }
 }
 
+/// Farther out, in standard deviations, probabilities are lost in the rounding of 1.
+const NEVER: f64 = 9.0;
+
+fn cdf(u: f64) -> f64 {
+    match u.abs() > NEVER {
+        true => f64::from(u > 0.0),
+        false => normal_cdf(u),
+    }
+}
+
 /// `E max(x + e, 0)`, `e ~ N(0, sd^2)`.
 fn plus(x: f64, sd: f64) -> f64 {
     if sd <= 0.0 {
         return x.max(0.0);
     }
     let u = x / sd;
-    sd * (normal_density(u) + u * normal_cdf(u))
+    match u.abs() > NEVER {
+        true => x.max(0.0),
+        false => sd * (normal_density(u) + u * normal_cdf(u)),
+    }
 }
 
 /// The integral of [`plus`] up to `x`: `E max(x + e, 0)^2 / 2`.

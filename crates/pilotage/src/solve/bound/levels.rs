@@ -32,16 +32,17 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    /// At most so many levels: the closer two may be and still be two, the fewer are needed.
-    pub fn new(a: [f64; 2], classes: &[[Noise; 2]], starts: &[Variances], limit: usize) -> Self {
+    /// At most so many levels, as far as an episode of a length reaches: the closer two may be and still be two, the fewer are needed.
+    pub fn new(
+        a: [f64; 2],
+        classes: &[[Noise; 2]],
+        starts: &[Variances],
+        limit: usize,
+        length: usize,
+    ) -> Self {
         let mut tolerance = 1e-6;
         loop {
-            let levels = Self::within(a, classes, starts, limit, tolerance);
-            let cut = levels
-                .steps
-                .iter()
-                .flatten()
-                .any(|step| step.next.is_none());
+            let (levels, cut) = Self::within(a, classes, starts, (limit, length), tolerance);
             tolerance *= 4.0;
             if !cut || tolerance > 0.1 {
                 return levels;
@@ -53,9 +54,10 @@ impl Levels {
         a: [f64; 2],
         classes: &[[Noise; 2]],
         starts: &[Variances],
-        limit: usize,
+        (limit, length): (usize, usize),
         tolerance: f64,
-    ) -> Self {
+    ) -> (Self, bool) {
+        let mut cut = false;
         let mut levels = Self {
             variances: Vec::new(),
             steps: Vec::new(),
@@ -69,19 +71,25 @@ impl Levels {
             });
             levels.starts.push(level);
         }
-        let mut level = 0;
+        // Levels are found in the order of the steps it takes to reach them.
+        let (mut level, mut depth, mut deeper) = (0, 0, levels.variances.len());
         while level < levels.variances.len() {
+            if level == deeper {
+                (depth, deeper) = (depth + 1, levels.variances.len());
+            }
             let from = levels.variances[level];
+            let limit = if depth + 1 < length { limit } else { 0 };
             let steps = classes.iter().map(|class| {
                 let (predicted, left) = advance(a, class, from);
                 let next = levels.place(left, tolerance, limit, |from| advance(a, class, from).1);
+                cut |= next.is_none() && limit > 0;
                 Step { predicted, next }
             });
             let steps = steps.collect();
             levels.steps.push(steps);
             level += 1;
         }
-        levels
+        (levels, cut)
     }
 
     /// A level just below the variances: a known one, that at which they come to rest, or a new one.

@@ -40,7 +40,6 @@ pub(super) fn axes(mdp: &BeliefMdp, settings: &Settings) -> Result<Vec<Axis>> {
         true => wanted,
         false => axes,
     };
-    resolves(mdp, &axes)?;
     let total = size(&axes);
     let mebibytes = mebibytes(mdp, total);
     if mebibytes > settings.memory {
@@ -51,6 +50,7 @@ pub(super) fn axes(mdp: &BeliefMdp, settings: &Settings) -> Result<Vec<Axis>> {
             limit: settings.memory,
         });
     }
+    resolves(mdp, &axes)?;
     Ok(axes)
 }
 
@@ -157,7 +157,7 @@ fn paid_places(model: &Model) -> impl Iterator<Item = (String, &Region)> {
 
 /// Points to a place where something is paid, where the default of the grid can be chosen; and the least that will do.
 const FINE: f64 = 20.0;
-const COARSE: f64 = 2.0;
+const COARSE: f64 = 1.0;
 
 /// How far apart points may be along a variable: the expected reward of a belief changes over a length of the narrowest place where
 /// something is paid, which `points` of them resolve, or over the belief's own width where that is more, which two do.

@@ -38,6 +38,8 @@ pub struct GridPolicy {
     /// `discount * W`, by mode, level and noise class: what is still to come after an action of the class, by where the next
     /// mean is centred.
     pub(super) expected: Vec<Vec<f64>>,
+    /// Probability of being within the limits, by level; empty without limits.
+    alive: Vec<Vec<f64>>,
     /// Value of the start belief.
     pub(super) start_value: f64,
     /// What it earns in an episode, where that is not the value of the start belief.
@@ -87,6 +89,16 @@ pub(super) fn iterate(
     Ok(policy)
 }
 
+/// Probability of being within the limits at every point, by level; empty without limits.
+fn alive(mdp: &BeliefMdp, grid: &Grid) -> Vec<Vec<f64>> {
+    if mdp.model().episode.alive.sides.is_empty() {
+        return Vec::new();
+    }
+    let at_level =
+        |level| crate::parallel::map(grid.len(), |point| mdp.alive(level, &grid.point(point)));
+    (0..mdp.levels().len()).map(at_level).collect()
+}
+
 /// Levels that lead back to each other, in an order such that every group only leads to itself and those before it.
 fn groups_of_levels(mdp: &BeliefMdp) -> Vec<Vec<LevelId>> {
     let levels = mdp.levels();
@@ -120,6 +132,7 @@ impl GridPolicy {
         Self {
             values: vec![vec![0.0; grid.len()]; modes * levels],
             expected: vec![vec![0.0; grid.len()]; modes * levels * classes],
+            alive: alive(&mdp, &grid),
             start_value: 0.0,
             promised: None,
             remarks: Vec::new(),
@@ -302,11 +315,17 @@ impl GridPolicy {
         }
     }
 
-    /// What a belief at a level is worth to a step that leads there: discounted.
+    /// What a belief at a level is worth to a step that leads there: discounted, as far as the agent is alive to have it.
     fn to_come(&self, mode: usize, level: LevelId) -> Vec<f64> {
         let discount = self.mdp.model().discount;
         let values = self.values[self.value_index(mode, level)].iter();
-        values.map(|value| discount * value).collect()
+        match self.alive.get(level) {
+            None => values.map(|value| discount * value).collect(),
+            Some(alive) => values
+                .zip(alive)
+                .map(|(value, alive)| alive * discount * value)
+                .collect(),
+        }
     }
 
     /// Rewards and places to look up, which no sweep changes.
@@ -343,17 +362,18 @@ impl GridPolicy {
         if model.cost.is_some() {
             reward += share(Then::End) * model.discount * self.mdp.terminal_cost(level, mean);
         }
-        let fails = self.mdp.failure(level, mean, action);
+        let survival = self.mdp.survival(level, mean, action);
+        let fails = 1.0 - survival.probability;
         if fails > 0.0 {
             reward += share(Then::Continue) * fails * model.episode.failure_reward;
         }
         let class = self.mdp.levels().class_of(action);
         let next: Vec<(usize, f64)> = outcomes
             .iter()
-            .filter(|outcome| outcome.then == Then::Continue && fails < 1.0)
+            .filter(|outcome| outcome.then == Then::Continue && survival.odds > 0.0)
             .map(|outcome| {
                 let index = self.expected_index(outcome.mode, level, class);
-                (index, (1.0 - fails) * outcome.probability)
+                (index, survival.odds * outcome.probability)
             })
             .collect();
         let centres = if next.is_empty() {
