@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use pilotage::Error;
 use pilotage::belief::BeliefMdp;
+use pilotage::policy;
 use pilotage::scenario;
 use pilotage::solve::Registry;
 use serde_json::json;
@@ -15,11 +16,14 @@ use crate::failure::Failure;
 #[derive(Args)]
 pub struct Arguments {
     /// A model file, or the name of a built-in problem.
-    #[arg(required_unless_present = "schema")]
+    #[arg(required_unless_present_any = ["schema", "policy_schema"])]
     file: Option<PathBuf>,
     /// Print the JSON schema of model files instead.
     #[arg(long, conflicts_with = "file")]
     schema: bool,
+    /// Print the JSON schema of policy files instead.
+    #[arg(long, conflicts_with_all = ["file", "schema"])]
+    policy_schema: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -28,7 +32,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let Some(file) = &arguments.file else {
-        writeln!(out, "{:#}", scenario::schema().as_value())?;
+        let schema = match arguments.policy_schema {
+            true => policy::schema(),
+            false => scenario::schema(),
+        };
+        writeln!(out, "{:#}", schema.as_value())?;
         return Ok(());
     };
     let model = scenario::find(file)?.model;

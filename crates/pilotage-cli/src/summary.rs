@@ -59,7 +59,7 @@ pub fn earned(earned: &Earned, planned: Option<f64>, as_assumed: bool) -> String
 /// The most that any policy can earn, and how far what is earned where the model holds lies below it.
 pub fn bound(bound: &Bound, earned: f64) -> String {
     let gap = bound.gap(earned).map_or(String::new(), |gap| {
-        format!(", {:.1} % above", 100.0 * gap.max(0.0))
+        format!(", gap {:.1} %", 100.0 * gap.max(0.0))
     });
     format!(
         "  at most              {:.4}{gap}\n                       {}",

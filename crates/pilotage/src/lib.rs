@@ -31,6 +31,7 @@
 //! ```
 
 pub mod belief;
+mod digest;
 pub mod error;
 mod files;
 pub mod model;

@@ -1,8 +1,11 @@
 //! ARKAQ-learning: what it finds, what it says when there is too much, and that a stopped run ends like one that was not.
 #![allow(clippy::unwrap_used)]
 
+mod common;
+
 use std::sync::Mutex;
 
+use common::automata::sealed;
 use pilotage::Error;
 use pilotage::belief::BeliefMdp;
 use pilotage::model::{Interval, Model};
@@ -222,11 +225,14 @@ fn an_automaton_runs_from_its_file_as_it_was_learned() {
     // A mode that there is none of makes a damaged file.
     let mut damaged: serde_json::Value = serde_json::from_str(&text).unwrap();
     let next = damaged
-        .pointer_mut("/automaton/filter/recall/next/0")
+        .pointer_mut("/policy/memory/recall/next/0/0/0")
         .unwrap();
     *next = learned.automaton.modes.len().into();
-    let error = Automaton::from_json(&damaged.to_string(), "test").unwrap_err();
-    assert!(matches!(error, Error::Policy { .. }), "{error}");
+    let error = Automaton::from_json(&sealed(damaged), "test").unwrap_err();
+    assert!(
+        error.to_string().contains("memory.recall.next[0][0][0]"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -326,7 +326,8 @@ fn checkpoints_of_other_runs_are_refused() {
             "\"solver\":\"arkaq\"",
             "solver `arkaq`",
         ),
-        ("\"checkpoint\":1", "\"checkpoint\":99", "format 99"),
+        ("\"checkpoint\":2", "\"checkpoint\":1", "format 1 of"),
+        ("\"checkpoint\":2", "\"checkpoint\":99", "format 99"),
         (
             concat!("\"pilotage\":\"", env!("CARGO_PKG_VERSION")),
             "\"pilotage\":\"99.0.0",
@@ -340,6 +341,15 @@ fn checkpoints_of_other_runs_are_refused() {
         let refused = refusal(&basic, &hurried(1), &path);
         assert!(refused.contains(message), "{refused}");
     }
+    // The first line as version 0.1.0 wrote it.
+    let old = r#"{"checkpoint":1,"pilotage":"0.1.0","solver":"kafaq","problem":"basic","fingerprint":12345,"settings":{},"checksum":678}"#;
+    std::fs::write(&path, format!("{old}\n{{}}\n")).unwrap();
+    let refused = refusal(&basic, &hurried(1), &path);
+    assert!(
+        refused.contains("checkpoint format 1 of pilotage 0.1.0")
+            && refused.contains("start afresh"),
+        "{refused}"
+    );
 }
 
 #[test]
@@ -493,7 +503,5 @@ fn a_pole_is_balanced_by_a_few_regions_of_its_own_motion() {
     let json = learned.automaton.to_json().unwrap();
     let read = Automaton::from_json(&json, "x").unwrap();
     assert_eq!(read, learned.automaton);
-    let damaged = json.replacen("\"mode 1.118\",", "", 1);
-    let refused = Automaton::from_json(&damaged, "x").map(drop).unwrap_err();
-    assert!(refused.to_string().contains("coordinates"), "{refused}");
+    assert!(json.contains("\"mode 1.118\""), "{json}");
 }

@@ -1,10 +1,20 @@
 //! The filter as it runs: a belief is a level and a mean, its update two small matrix-vector products.
 
-use serde::{Deserialize, Serialize};
-
 use super::levels::{LevelGraph, LevelId};
 use super::recall::Recall;
 use crate::model::{ActionId, Barriers, ModeId, Model, Region, WallBelief, When};
+
+/// Largest magnitude of a mean, and of any number of a policy.
+///
+/// A step multiplies at most four numbers and adds up fewer than `(n + 1)^2 (m + 1)` such products for `n` state variables and `m` readings,
+/// so that nothing in it is larger than `(n + 1)^2 (m + 1) LARGEST^4`, which is finite for every `n` and `m` that fit a memory.
+pub const LARGEST: f64 = 1e60;
+
+/// Whether a mean is one that an agent can act on: every component less than [`LARGEST`] in magnitude. One that is not has grown without
+/// end, and was cut.
+pub(crate) fn is_kept(mean: &[f64]) -> bool {
+    mean.iter().all(|m| m.abs() < LARGEST)
+}
 
 /// What the agent knows: an uncertainty level, the mean at that level, and the hidden mode it takes to be the case.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +28,7 @@ pub struct Belief {
 }
 
 /// A change of mode that the agent infers from its own action and belief.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Switch {
     /// Actions it happens on; `None` for all.
     pub actions: Option<Vec<ActionId>>,
@@ -48,29 +58,30 @@ impl Switch {
 ///
 /// The mean is predicted, `m- = A m + B u`, and corrected, `m = m- + K (o - H m-)`, with the gain of the step of the level graph.
 /// Where the belief knows of walls, the prediction stops at them and the corrected mean is kept where a state can be.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+///
+/// A mean never leaves [`LARGEST`]; as long as no reading does either, and none of the filter's numbers, it stays finite.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
-    states: usize,
-    readings: usize,
+    pub(crate) states: usize,
+    pub(crate) readings: usize,
     /// Start level, mode and mean.
-    start: (LevelId, ModeId, Vec<f64>),
+    pub(crate) start: (LevelId, ModeId, Vec<f64>),
     /// Per level and action: next level.
-    next: Vec<LevelId>,
+    pub(crate) next: Vec<LevelId>,
     /// Per level and action: `K`, column by column.
-    gains: Vec<f64>,
+    pub(crate) gains: Vec<f64>,
     /// `A`, row by row.
-    motion: Vec<f64>,
+    pub(crate) motion: Vec<f64>,
     /// Per action: `B u`.
-    displacements: Vec<f64>,
+    pub(crate) displacements: Vec<f64>,
     /// `H`, row by row.
-    sensor: Vec<f64>,
-    actions: usize,
-    switches: Vec<Switch>,
+    pub(crate) sensor: Vec<f64>,
+    pub(crate) actions: usize,
+    pub(crate) switches: Vec<Switch>,
     /// The walls, where the belief knows of them.
-    walls: Option<Barriers>,
+    pub(crate) walls: Option<Barriers>,
     /// Where it decides on modes, instead of the switches.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    recall: Option<Recall>,
+    pub(crate) recall: Option<Recall>,
 }
 
 impl Filter {
@@ -135,6 +146,7 @@ impl Filter {
     pub fn recalling(mut self, recall: Recall) -> Self {
         self.start.1 = recall.first(&self.start.2);
         self.recall = Some(recall);
+        self.switches.clear();
         self
     }
 
@@ -158,39 +170,6 @@ impl Filter {
         belief.level = self.start.0;
         belief.mode = self.start.1;
         belief.mean.copy_from_slice(&self.start.2);
-    }
-
-    /// Whether the arrays have the sizes that go with so many levels, actions and modes, and lead to no others.
-    pub(crate) fn fits(&self, levels: usize, actions: usize, modes: usize) -> bool {
-        let edges = levels * actions;
-        let (n, m) = (self.states, self.readings);
-        // Sizes from a damaged file may be too large to multiply.
-        let holds = |values: &[f64], sizes: [usize; 3]| {
-            let size = sizes
-                .iter()
-                .try_fold(1_usize, |size, next| size.checked_mul(*next));
-            size == Some(values.len()) && values.iter().all(|value| value.is_finite())
-        };
-        self.actions == actions
-            && self.next.len() == edges
-            && self.next.iter().all(|&next| next < levels)
-            && holds(&self.gains, [edges, n, m])
-            && holds(&self.motion, [n, n, 1])
-            && holds(&self.displacements, [actions, n, 1])
-            && holds(&self.sensor, [m, n, 1])
-            && (self.start.0 < levels && self.start.1 < modes && self.start.2.len() == self.states)
-            && self.switches.iter().all(|switch| {
-                switch.becomes < modes
-                    && switch.region.sides.iter().all(|side| side.0 < self.states)
-            })
-            && self
-                .walls
-                .as_ref()
-                .is_none_or(|walls| walls.fits(self.states))
-            && self
-                .recall
-                .as_ref()
-                .is_none_or(|recall| recall.fits(self.states, actions, modes))
     }
 
     /// Number of state variables.
@@ -222,6 +201,9 @@ impl Filter {
             for (value, gain) in belief.mean.iter_mut().zip(column) {
                 *value += gain * innovation;
             }
+        }
+        for value in &mut belief.mean {
+            *value = value.clamp(-LARGEST, LARGEST);
         }
         if let Some(walls) = &self.walls {
             walls.confine(&mut belief.mean);

@@ -11,7 +11,8 @@ mod nearby;
 pub mod recall;
 pub mod riccati;
 
-pub use filter::{Belief, Filter, Switch};
+pub(crate) use filter::is_kept;
+pub use filter::{Belief, Filter, LARGEST, Switch};
 pub use hypotheses::{Hypothesis, Merge, Tracker, Tracking};
 pub use kalman::{Correction, KalmanFilter};
 pub use levels::{ClassId, LevelGraph, LevelId};

@@ -14,20 +14,20 @@ pub type ClusterId = usize;
 /// Clusters of belief means: a mean is in the one whose centre is nearest, lengths measured by the world's outer bounds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Clusters {
-    bounds: Vec<Interval>,
+    pub(crate) bounds: Vec<Interval>,
     /// By cluster, length `n`, in units of the state.
-    centres: Vec<Vec<f64>>,
+    pub(crate) centres: Vec<Vec<f64>>,
 }
 
 /// Finds the next mode from the one before, the action and the mean.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Recall {
-    clusters: Clusters,
-    actions: usize,
+    pub(crate) clusters: Clusters,
+    pub(crate) actions: usize,
     /// By cluster: the mode of an episode that starts in it.
-    first: Vec<ModeId>,
+    pub(crate) first: Vec<ModeId>,
     /// By mode, action and cluster: the mode afterwards.
-    next: Vec<ModeId>,
+    pub(crate) next: Vec<ModeId>,
 }
 
 impl Clusters {
@@ -79,16 +79,6 @@ impl Clusters {
         });
         squares.sum::<f64>() / a.len() as f64
     }
-
-    fn fits(&self, states: usize) -> bool {
-        let finite = |bounds: &Interval| bounds.width() > 0.0 && bounds.width().is_finite();
-        let place =
-            |centre: &Vec<f64>| centre.len() == states && centre.iter().all(|x| x.is_finite());
-        !self.is_empty()
-            && self.bounds.len() == states
-            && self.bounds.iter().all(finite)
-            && self.centres.iter().all(place)
-    }
 }
 
 impl Recall {
@@ -137,16 +127,6 @@ impl Recall {
                 .flat_map(|(_, row)| row.iter().map(renumbered))
                 .collect(),
         }
-    }
-
-    /// Whether sizes and numbers are as they have to be.
-    pub(super) fn fits(&self, states: usize, actions: usize, modes: usize) -> bool {
-        let is_mode = |mode: &ModeId| *mode < modes;
-        self.clusters.fits(states)
-            && self.actions == actions
-            && self.first.len() == self.clusters.len()
-            && self.next.len() == modes * actions * self.clusters.len()
-            && self.first.iter().chain(&self.next).all(is_mode)
     }
 }
 

@@ -1,17 +1,15 @@
 //! What stops motion: the bounds of the world, and the walls of its map where there is one.
 
-use serde::{Deserialize, Serialize};
-
 use super::{Interval, Map, Model};
 
 /// The walls of a world. The true state stops at them, and so does a belief that knows of them.
 ///
 /// Without a map they are the bounds, taken one variable at a time. With one, the first two variables are stopped by its edges,
 /// blocked cells and thin walls, and the others by their bounds.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Barriers {
-    bounds: Vec<Interval>,
-    map: Option<Map>,
+    pub(crate) bounds: Vec<Interval>,
+    pub(crate) map: Option<Map>,
 }
 
 impl Barriers {
@@ -26,11 +24,6 @@ impl Barriers {
     /// Number of state variables.
     pub fn states(&self) -> usize {
         self.bounds.len()
-    }
-
-    /// Whether a map fits the number of state variables.
-    pub(crate) fn fits(&self, states: usize) -> bool {
-        self.bounds.len() == states && (self.map.is_none() || states >= 2)
     }
 
     /// Moves `to` back to where the straight way from `from` to it is stopped. Both have length `n`.

@@ -2,8 +2,6 @@
 
 mod drawing;
 
-use serde::{Deserialize, Serialize};
-
 use super::{Interval, Region};
 pub(crate) use drawing::draw;
 
@@ -25,8 +23,7 @@ pub(crate) use drawing::draw;
 ///          |       *|
 ///          +--+--+--+
 /// ```
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(try_from = "Drawing", into = "Drawing")]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Map {
     /// The drawing, top row first, as written in the model file.
     pub rows: Vec<String>,
@@ -39,31 +36,6 @@ pub struct Map {
     /// Named cells, such as goals and stations. Several cells may bear one mark.
     pub marks: Vec<(char, Region)>,
     grid: Grid,
-}
-
-/// All that a map is saved as.
-#[derive(Serialize, Deserialize)]
-struct Drawing {
-    cell: f64,
-    rows: Vec<String>,
-}
-
-impl From<Map> for Drawing {
-    fn from(map: Map) -> Self {
-        Self {
-            cell: map.cell,
-            rows: map.rows,
-        }
-    }
-}
-
-impl TryFrom<Drawing> for Map {
-    type Error = String;
-
-    fn try_from(drawing: Drawing) -> Result<Self, String> {
-        draw(&drawing.rows.join("\n"), drawing.cell)
-            .map_err(|fault| format!("in a map, {}", fault.message))
-    }
 }
 
 /// What stops motion, cell by cell.

@@ -8,6 +8,7 @@ mod barriers;
 mod builder;
 mod effects;
 pub(crate) mod error;
+pub(crate) mod fingerprint;
 pub(crate) mod map;
 mod region;
 pub(crate) mod validate;
@@ -20,6 +21,7 @@ pub use barriers::Barriers;
 pub use builder::{Clause, ModelBuilder};
 pub use effects::{Change, Effect, Outcome, Tally, apart};
 pub use error::{Fault, ModelError, Path, Place, Step, nearest, suggest};
+pub use fingerprint::{Fingerprint, NotAFingerprint};
 pub use map::Map;
 pub use region::{Interval, Region};
 
@@ -348,21 +350,6 @@ impl Model {
     /// Displacement `B u` of an action.
     pub fn displacement(&self, action: ActionId) -> DVector<f64> {
         &self.motion.b * &self.actions[action].control
-    }
-
-    /// A number that changes when anything a policy depends on changes; name and description do not count.
-    pub fn fingerprint(&self) -> u64 {
-        let nameless = Self {
-            name: String::new(),
-            about: String::new(),
-            ..self.clone()
-        };
-        // FNV-1a over the text of every field: any change of a number changes it, and it is the same on every machine.
-        format!("{nameless:?}")
-            .bytes()
-            .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-            })
     }
 
     /// Where something good is paid: the regions of all rewards and events above 0.

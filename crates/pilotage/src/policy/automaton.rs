@@ -2,22 +2,23 @@
 
 use std::ops::RangeInclusive;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::belief::{Belief, BeliefMdp, Filter, LevelId};
-use crate::model::{ActionId, ModeId};
+use crate::model::{ActionId, Fingerprint, ModeId};
 use crate::policy::{Coordinates, Policy};
 
 /// Index into [`Automaton::nodes`].
 pub type NodeId = usize;
 
 /// A policy as a finite automaton. Running it is: update the filter, match a node, act.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Automaton {
     /// Name of the problem it was made for.
     pub problem: String,
     /// [`crate::model::Model::fingerprint`] of that problem.
-    pub fingerprint: u64,
+    pub fingerprint: Fingerprint,
     /// Name of the solver that made it.
     pub solver: String,
     /// How a belief finds its node.
@@ -33,7 +34,6 @@ pub struct Automaton {
     /// Return expected from the start, where the solver knows.
     pub planned_value: Option<f64>,
     /// Coordinates in which places are stated; `None` for the state variables themselves.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coordinates: Option<Coordinates>,
     /// Scale of each state variable, or coordinate, when distances are measured; 1 leaves it.
     pub scale: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct Automaton {
 }
 
 /// How a belief finds its node among those of its level and mode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Matching {
     /// The nearest point (5.4.2).
@@ -54,7 +54,7 @@ pub enum Matching {
 }
 
 /// A node of the automaton.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Node {
     /// First and last uncertainty level it stands for.
     pub levels: (LevelId, LevelId),
@@ -75,8 +75,8 @@ pub struct Node {
 }
 
 /// A point or box of means.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
 pub enum Place {
     /// A representative belief point, length `n`.
     Point(Vec<f64>),
@@ -92,7 +92,7 @@ pub enum Place {
 }
 
 /// What is sensed on arriving at a node.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Observed {
     /// Mean, length `m`.
     pub mean: Vec<f64>,
@@ -119,6 +119,14 @@ impl Node {
             predecessors: Vec::new(),
             visits: 0.0,
         }
+    }
+}
+
+impl Node {
+    /// How many levels it is away from one; 0 where it stands for it.
+    fn gap(&self, level: LevelId) -> usize {
+        let (first, last) = self.levels;
+        first.saturating_sub(level).max(level.saturating_sub(last))
     }
 }
 
@@ -240,15 +248,33 @@ impl Automaton {
     /// Nodes among which a belief of this level and mode finds its own. A level or mode without nodes borrows those of the
     /// nearest level in the same mode, then of any mode.
     pub fn candidates(&self, level: LevelId, mode: ModeId) -> impl Iterator<Item = NodeId> {
-        let gap = move |node: &Node| {
-            let (first, last) = node.levels;
-            (
-                node.mode != mode,
-                first.saturating_sub(level).max(level.saturating_sub(last)),
-            )
-        };
+        let gap = move |node: &Node| (node.mode != mode, node.gap(level));
         let smallest = self.nodes.iter().map(gap).min();
         (0..self.nodes.len()).filter(move |&id| Some(gap(&self.nodes[id])) == smallest)
+    }
+
+    /// The nodes of a mode; all of them where it has none.
+    pub(super) fn of_mode(&self, mode: ModeId) -> Vec<NodeId> {
+        let own = |id: &NodeId| self.nodes[*id].mode == mode;
+        let nodes = 0..self.nodes.len();
+        match nodes.clone().filter(own).collect::<Vec<_>>() {
+            none if none.is_empty() => nodes.collect(),
+            own => own,
+        }
+    }
+
+    /// Those of the nodes of a mode that are nearest to a level. With [`Automaton::of_mode`] they are the [`Automaton::candidates`], found
+    /// without looking at the nodes of all other modes again at every level.
+    pub(super) fn nearest_to_level(
+        &self,
+        level: LevelId,
+        own: &[NodeId],
+    ) -> impl Iterator<Item = NodeId> {
+        let gap = move |id: &&NodeId| self.nodes[**id].gap(level);
+        let smallest = own.iter().map(|id| gap(&id)).min();
+        own.iter()
+            .filter(move |id| Some(gap(id)) == smallest)
+            .copied()
     }
 
     pub(super) fn closest(

@@ -45,10 +45,11 @@ impl Controller {
             filter,
         };
         for mode in 0..automaton.modes.len() {
+            let own = automaton.of_mode(mode);
             for level in 0..levels {
                 let from = controller.nodes.len() / LANES;
                 let volume = |id: NodeId| automaton.nodes[id].place.volume();
-                let mut candidates: Vec<NodeId> = automaton.candidates(level, mode).collect();
+                let mut candidates: Vec<NodeId> = automaton.nearest_to_level(level, &own).collect();
                 candidates.sort_by(|&a, &b| volume(a).total_cmp(&volume(b)));
                 for block in candidates.chunks(LANES) {
                     controller.add(automaton, block);

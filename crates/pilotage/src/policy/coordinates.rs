@@ -1,12 +1,10 @@
 //! Linear coordinates of a mean, in which the places of an automaton may be stated.
 
-use serde::{Deserialize, Serialize};
-
 /// Most coordinates, so that a controller can keep them without allocating.
 pub const MOST_COORDINATES: usize = 8;
 
 /// Coordinates `w_1 . m, ..., w_k . m` of a mean `m`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Coordinates {
     /// What each is called.
     pub names: Vec<String>,
@@ -32,13 +30,5 @@ impl Coordinates {
         let mut place = vec![0.0; self.count()];
         self.write(mean, &mut place);
         place
-    }
-
-    /// Whether they are coordinates of `n` variables.
-    pub(super) fn fits(&self, n: usize) -> bool {
-        let sound = |row: &Vec<f64>| row.len() == n && row.iter().all(|w| w.is_finite());
-        (1..=MOST_COORDINATES).contains(&self.count())
-            && self.names.len() == self.count()
-            && self.rows.iter().all(sound)
     }
 }

@@ -1,76 +1,83 @@
-//! Automata as files: versioned JSON, written whole or not at all.
+//! Automata as files: versioned JSON with a checksum, written whole or not at all.
 
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
+use serde_json::value::RawValue;
 
-use crate::error::{Error, Result};
+use super::check::Fault;
+use super::file::{FORMAT, File, PolicyTable};
+use super::layout::{Quoted, lay_out};
+use crate::digest::Digest;
+use crate::error::{Error, Result, is_unseen};
 use crate::files::{read_text, write_whole};
 use crate::model::Model;
-use crate::policy::{Automaton, Node, Place};
+use crate::policy::Automaton;
 
-/// Version of the file format; a file of another is refused.
-const FORMAT: u32 = 1;
+/// Longest policy file that is read, MiB. What is read takes a few times as much memory.
+const MOST_MEBIBYTES: u64 = 32;
 
-/// Longest policy file that is read, MiB.
-const MOST_MEBIBYTES: u64 = 256;
-
-#[derive(Serialize, Deserialize)]
+/// What a file of every format begins with.
+#[derive(Deserialize)]
 struct Header {
-    format: u32,
+    format: u64,
     pilotage: String,
 }
 
-#[derive(Serialize, Deserialize)]
-struct File {
-    #[serde(flatten)]
-    header: Header,
-    automaton: Automaton,
+/// The checksum of the text of a policy.
+fn checksum(policy: &str) -> String {
+    let mut quoted = Quoted::default();
+    let space = |c: char| matches!(c, ' ' | '\t' | '\n' | '\r');
+    let mut digest = Digest::new();
+    for token in policy.split(|c| !quoted.after(c) && space(c)) {
+        digest.write(token.as_bytes());
+    }
+    digest.to_string()
 }
 
 impl Automaton {
-    /// The automaton as the text of a policy file.
+    /// The automaton as the text of a policy file, as `docs/policy-format.md` describes it.
+    ///
+    /// # Errors
+    /// [`Error::Policy`] for one that could not be read again: without nodes, with numbers that are not finite or larger than
+    /// [`crate::belief::LARGEST`], with parts that do not fit together, or larger than 32 MiB.
     pub fn to_json(&self) -> Result<String> {
-        let header = Header {
+        let fail = |reason: String| Error::Policy {
+            origin: self.problem.clone(),
+            reason: format!("the policy cannot be kept in a file: {reason}"),
+        };
+        let table = PolicyTable::new(self).and_then(|table| {
+            table.check()?;
+            Ok(table)
+        });
+        let table = table.map_err(|fault| fail(fault.to_string()))?;
+        let json = |error: serde_json::Error| fail(error.to_string());
+        let policy = serde_json::to_string(&table).map_err(json)?;
+        let file = File {
             format: FORMAT,
             pilotage: env!("CARGO_PKG_VERSION").to_owned(),
+            checksum: checksum(&policy),
+            policy: RawValue::from_string(policy).map_err(json)?,
         };
-        serde_json::to_string_pretty(&File {
-            header,
-            automaton: self.clone(),
-        })
-        .map_err(|error| Error::Policy {
-            origin: self.problem.clone(),
-            reason: format!("the policy cannot be written as JSON: {error}"),
-        })
+        let text = lay_out(&serde_json::to_string(&file).map_err(json)?);
+        if is_too_long(&text) {
+            return Err(fail(format!(
+                "{} bytes are more than the {MOST_MEBIBYTES} MiB that are read again; give the model fewer levels (`level_tolerance` in [belief]) or the policy fewer nodes",
+                text.len()
+            )));
+        }
+        Ok(text)
     }
 
     /// Reads the text of a policy file; `origin` names it in errors.
     ///
     /// # Errors
-    /// [`Error::Policy`] for text that is no policy file, of another format, or whose numbers do not fit together.
+    /// [`Error::Policy`] for text that is no policy file, of another format, damaged, or whose numbers do not fit together.
     pub fn from_json(text: &str, origin: &str) -> Result<Self> {
-        let fail = |reason: String| Error::Policy {
+        read(text).map_err(|reason| Error::Policy {
             origin: origin.to_owned(),
-            reason,
-        };
-        let header: Header =
-            serde_json::from_str(text).map_err(|error| fail(format!("not a policy file of pilotage ({error}); make one with `pilotage solve PROBLEM --out FILE`")))?;
-        if header.format != FORMAT {
-            return Err(fail(format!(
-                "policy format {} was written by pilotage {}; this is pilotage {} and reads format {FORMAT}; solve again to renew it",
-                header.format,
-                header.pilotage,
-                env!("CARGO_PKG_VERSION")
-            )));
-        }
-        let file: File = serde_json::from_str(text).map_err(|error| {
-            fail(format!(
-                "damaged policy file: {error}; solve again to renew it"
-            ))
-        })?;
-        file.automaton.check().map_err(fail)?;
-        Ok(file.automaton)
+            reason: in_a_line(&reason),
+        })
     }
 
     /// Reads a policy file.
@@ -88,7 +95,7 @@ impl Automaton {
     /// Writes a policy file, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Io`], otherwise as [`Automaton::to_json`].
     pub fn save(&self, path: &Path) -> Result<()> {
         write_whole(path, self.to_json()?.as_bytes())
     }
@@ -102,6 +109,13 @@ impl Automaton {
             format!(
                 "this policy is for {}, not for {}; solve {} to get one",
                 self.problem, model.name, model.name
+            )
+        } else if !self.fingerprint.comparable(&model.fingerprint()) {
+            format!(
+                "this policy names its problem by the fingerprint {}, which this version cannot compare with that of {}, {}; solve it again",
+                self.fingerprint,
+                model.name,
+                model.fingerprint()
             )
         } else if self.fingerprint != model.fingerprint() {
             format!(
@@ -152,75 +166,58 @@ impl Automaton {
         }
         Ok(())
     }
+}
 
-    fn check(&self) -> std::result::Result<(), String> {
-        let fault = self.filter_fault().map(str::to_owned).or_else(|| {
-            let nodes = self.nodes.iter().enumerate();
-            nodes
-                .filter_map(|(id, node)| Some(format!("node {id} {}", self.node_fault(node)?)))
-                .next()
-        });
-        fault.map_or(Ok(()), |fault| {
-            Err(format!("{fault}; solve again to renew the file"))
-        })
+fn read(text: &str) -> std::result::Result<Automaton, String> {
+    if is_too_long(text) {
+        return Err(format!(
+            "longer than the {MOST_MEBIBYTES} MiB that a policy file of pilotage can have"
+        ));
     }
-
-    fn filter_fault(&self) -> Option<&'static str> {
-        let n = self.states.len();
-        let sizes = (self.levels.len(), self.actions.len(), self.modes.len());
-        if self.filter.states() != n || !self.filter.fits(sizes.0, sizes.1, sizes.2) {
-            return Some("the filter does not fit the states, levels and actions");
-        }
-        let coordinates = self.coordinates.as_ref();
-        if coordinates.is_some_and(|coordinates| !coordinates.fits(n)) {
-            return Some("the coordinates are not named vectors of the state");
-        }
-        let places = self.place_names().len();
-        if self.scale.len() != places || !self.scale.iter().all(|s| *s > 0.0 && s.is_finite()) {
-            return Some("the scale is not one positive number for each state variable");
-        }
-        let square = |level: &Vec<f64>| level.len() == n * n && level.iter().all(|p| p.is_finite());
-        if !self.levels.iter().all(square) {
-            return Some("a level is not a covariance of the state");
-        }
-        None
-    }
-
-    fn node_fault(&self, node: &Node) -> Option<String> {
-        let n = self.place_names().len();
-        let fits =
-            |values: &[f64]| values.len() == n && values.iter().all(|value| value.is_finite());
-        let place_fits = match &node.place {
-            Place::Point(point) => fits(point),
-            Place::Segment {
-                lower,
-                minimum,
-                upper,
-            } => fits(lower) && fits(minimum) && fits(upper),
+    // The format comes first: another one has other keys.
+    let header: Header = serde_json::from_str(text).map_err(|error| {
+        format!(
+            "not a policy file of pilotage ({error}); make one with `pilotage solve PROBLEM --out FILE`"
+        )
+    })?;
+    if header.format != FORMAT {
+        let newer = match header.format > FORMAT {
+            true => "use that version, or solve again",
+            false => "solve again to renew it",
         };
-        if !place_fits {
-            return Some(format!("does not have {n} finite coordinates"));
-        }
-        if let Place::Segment {
-            lower,
-            minimum,
-            upper,
-        } = &node.place
-            && !(0..n).all(|i| lower[i] <= minimum[i] && minimum[i] <= upper[i])
-        {
-            return Some("is a segment whose point of least value lies outside it".to_owned());
-        }
-        if node.action >= self.actions.len()
-            || node.mode >= self.modes.len()
-            || node.levels.1 >= self.levels.len()
-            || node.levels.0 > node.levels.1
-        {
-            return Some("names an action, mode or level that is not there".to_owned());
-        }
-        let stranger = node
-            .predecessors
-            .iter()
-            .find(|(id, _)| *id >= self.nodes.len());
-        stranger.map(|(id, _)| format!("names predecessor {id}, which is not there"))
+        return Err(format!(
+            "policy format {} was written by pilotage {}; this is pilotage {} and reads format {FORMAT}; {newer}",
+            header.format,
+            header.pilotage,
+            env!("CARGO_PKG_VERSION")
+        ));
     }
+    let damaged = |what: String| format!("damaged policy file: {what}; solve again to renew it");
+    let json = |error: serde_json::Error| damaged(error.to_string());
+    let fault = |fault: Fault| damaged(fault.to_string());
+    let file: File<&RawValue> = serde_json::from_str(text).map_err(json)?;
+    let policy = file.policy.get();
+    if file.checksum != checksum(policy) {
+        return Err(format!(
+            "damaged policy file: its checksum is {}, and that of its policy {}; solve again to renew it or, if it was edited on purpose, correct the former",
+            file.checksum,
+            checksum(policy)
+        ));
+    }
+    let table: PolicyTable = serde_json::from_str(policy).map_err(json)?;
+    table.check().map_err(fault)?;
+    table.automaton().map_err(fault)
+}
+
+fn is_too_long(text: &str) -> bool {
+    text.len() as u64 > MOST_MEBIBYTES << 20
+}
+
+/// The text in one line, with what is unseen in it, which may come from the file, made visible.
+fn in_a_line(text: &str) -> String {
+    let shown = |c: char| match is_unseen(c) {
+        true => c.escape_unicode().to_string(),
+        false => c.to_string(),
+    };
+    text.chars().map(shown).collect()
 }

@@ -7,6 +7,7 @@ mod builtin;
 mod cart_pole;
 mod file;
 mod file_value;
+mod fingerprint;
 mod locate;
 mod read;
 mod resolve;

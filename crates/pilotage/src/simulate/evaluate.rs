@@ -50,7 +50,8 @@ pub struct Evaluation {
     pub lost: Option<Lost>,
 }
 
-/// A belief whose mean was no longer finite: the state, or the filter's own numbers, had grown beyond every number.
+/// A belief whose mean had grown to [`crate::belief::LARGEST`], beyond which filters keep none: the state, or the filter's own numbers, grow
+/// without end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lost {
     /// Number of the first episode in which it happened, from 0.

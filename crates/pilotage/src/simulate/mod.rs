@@ -12,6 +12,7 @@ pub(crate) use evaluate::summarise;
 pub use evaluate::{Difference, Evaluation, Lost, Options, compare, evaluate};
 pub use life::{Life, LifeOptions, Run, life};
 
+use crate::belief::is_kept;
 use crate::model::{ActionId, Then};
 use crate::world::{Draws, World};
 
@@ -26,7 +27,7 @@ pub struct Episode {
     pub steps: usize,
     /// Whether it ended in failure.
     pub failed: bool,
-    /// Whether it ended because the mean of the agent's belief was no longer finite.
+    /// Whether it ended because the mean of the agent's belief had grown to [`crate::belief::LARGEST`].
     pub lost: bool,
 }
 
@@ -52,7 +53,7 @@ pub struct Moment<'a> {
 /// Runs one episode of at most `length` steps. `observation` is a buffer for the sensor's `m` readings.
 ///
 /// The order is that of POMDPs.jl: stop if the episode is over, act, collect the discounted reward, then update the belief. An agent
-/// whose belief is no longer finite has nothing to act on: the episode ends there. What ending costs is paid after the last step.
+/// whose mean has grown to [`crate::belief::LARGEST`] has no belief to act on: the episode ends there. What ending costs is paid after the last step.
 pub fn run_episode(
     world: &mut dyn World,
     agent: &mut dyn Agent,
@@ -97,7 +98,7 @@ pub fn run_episode(
             episode.failed = step.failed;
             break;
         }
-        if agent.belief().mean.iter().any(|m| !m.is_finite()) {
+        if !is_kept(&agent.belief().mean) {
             episode.lost = true;
             break;
         }

@@ -247,7 +247,7 @@ struct Pair {
 ///
 /// # Errors
 /// [`Error::Unsupported`] for a model with one start, or without anything good to reach; [`Error::Setting`] for settings out of
-/// range; [`Error::Lost`] where an agent's belief is no longer finite.
+/// range; [`Error::Lost`] where the mean of an agent's belief has grown to [`crate::belief::LARGEST`].
 pub fn measure(
     mdp: &BeliefMdp,
     truth: &Truth,

@@ -1,5 +1,7 @@
 //! What several tests need: models by name, models made of matrices, matrices made of arbitrary numbers.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::unwrap_used)]
+
+pub mod automata;
 
 use nalgebra::{DMatrix, DVector};
 use pilotage::model::{

@@ -3,7 +3,7 @@
 use super::settings::Settings;
 use crate::belief::{BeliefMdp, Filter};
 use crate::error::{Error, Result};
-use crate::model::Model;
+use crate::model::{Fingerprint, Model};
 use crate::policy::Automaton;
 use crate::solve::Settings as _;
 use crate::solve::learn::{Trial, Worlds, known, run_trial};
@@ -20,7 +20,7 @@ pub struct Task<'a> {
     pub(super) settings: Settings,
     pub(super) worlds: &'a Worlds<'a>,
     /// Fingerprint of the whole problem.
-    pub(super) fingerprint: u64,
+    pub(super) fingerprint: Fingerprint,
 }
 
 impl<'a> Task<'a> {

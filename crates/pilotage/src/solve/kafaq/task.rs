@@ -5,7 +5,7 @@ use super::lattice::{Lattice, cells_needed};
 use super::settings::Settings;
 use crate::belief::{BeliefMdp, Filter, LevelId};
 use crate::error::{Error, Result};
-use crate::model::Model;
+use crate::model::{Fingerprint, Model};
 use crate::policy::{Automaton, Coordinates, MOST_COORDINATES};
 use crate::solve::Settings as _;
 use crate::solve::learn::{Actor, Trial, Worlds, known, run_trial};
@@ -26,7 +26,7 @@ pub struct Task<'a> {
     /// Levels from the start to the steady one.
     pub(super) chain: Vec<LevelId>,
     /// Fingerprint of the whole problem.
-    pub(super) fingerprint: u64,
+    pub(super) fingerprint: Fingerprint,
 }
 
 impl<'a> Task<'a> {

@@ -7,24 +7,26 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::digest::Digest;
 use crate::error::{Error, Result};
 use crate::files::{self, write_whole};
+use crate::model::Fingerprint;
 
 /// Version of the file format.
-const FORMAT: u32 = 1;
+const FORMAT: u64 = 2;
 
 /// Longest checkpoint that is read, MiB.
 const MOST_MEBIBYTES: u64 = 1024;
 
 #[derive(Serialize, Deserialize)]
 struct Header<S> {
-    checkpoint: u32,
+    checkpoint: u64,
     pilotage: String,
     solver: String,
     problem: String,
-    fingerprint: u64,
+    fingerprint: Fingerprint,
     settings: S,
-    checksum: u64,
+    checksum: String,
 }
 
 /// Whose run a checkpoint is.
@@ -34,7 +36,7 @@ pub struct Owner<'a, S> {
     /// Name of the problem.
     pub problem: &'a str,
     /// Fingerprint of the problem.
-    pub fingerprint: u64,
+    pub fingerprint: Fingerprint,
     /// Settings of the learner, its seed among them.
     pub settings: &'a S,
 }
@@ -54,7 +56,7 @@ impl<S: Clone + PartialEq + Serialize + DeserializeOwned> Owner<'_, S> {
             problem: self.problem.to_owned(),
             fingerprint: self.fingerprint,
             settings: self.settings.clone(),
-            checksum: checksum(&state),
+            checksum: Digest::of(&state).to_string(),
         };
         let header = serde_json::to_string(&header).map_err(fail)?;
         write_whole(path, format!("{header}\n{state}\n").as_bytes())
@@ -90,8 +92,9 @@ impl<S: Clone + PartialEq + Serialize + DeserializeOwned> Owner<'_, S> {
         let version = value.get("pilotage").and_then(serde_json::Value::as_str);
         let this = env!("CARGO_PKG_VERSION");
         match (format, version) {
-            (Some(format), Some(version)) if format == u64::from(FORMAT) && version == this => {}
+            (Some(format), Some(version)) if format == FORMAT && version == this => {}
             (Some(format), Some(version)) => {
+                let version = version.escape_debug();
                 return Err(format!(
                     "checkpoint format {format} of pilotage {version}; this is pilotage {this}, which goes on with its own, format {FORMAT}; \
                      finish with that version or delete the file to start afresh"
@@ -105,7 +108,8 @@ impl<S: Clone + PartialEq + Serialize + DeserializeOwned> Owner<'_, S> {
             .unwrap_or("");
         if solver != self.solver {
             return Err(format!(
-                "a checkpoint of the solver `{solver}`, not of `{}`",
+                "a checkpoint of the solver `{}`, not of `{}`",
+                solver.escape_debug(),
                 self.solver
             ));
         }
@@ -114,7 +118,8 @@ impl<S: Clone + PartialEq + Serialize + DeserializeOwned> Owner<'_, S> {
         if header.problem != self.problem {
             return Err(format!(
                 "a checkpoint of the problem {}, not of {}",
-                header.problem, self.problem
+                header.problem.escape_debug(),
+                self.problem
             ));
         }
         if header.fingerprint != self.fingerprint {
@@ -129,16 +134,9 @@ impl<S: Clone + PartialEq + Serialize + DeserializeOwned> Owner<'_, S> {
         let state = state
             .strip_suffix('\n')
             .ok_or_else(|| damaged("it ends too early"))?;
-        if checksum(state) != header.checksum {
+        if Digest::of(state).to_string() != header.checksum {
             return Err(damaged("its checksum is wrong"));
         }
         serde_json::from_str(state).map_err(|error| damaged(&error.to_string()))
     }
-}
-
-/// FNV-1a.
-fn checksum(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    })
 }

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Stage;
 use crate::belief::BeliefMdp;
+use crate::belief::is_kept;
 use crate::belief::kalman::Correction;
 use crate::error::{Error, Result};
 use crate::model::{Model, QuadraticCost};
@@ -183,7 +184,7 @@ impl Controller {
             let predicted = a * mean + b * control;
             mean = &predicted + &correction.gain * (observation - h * &predicted);
             episode.steps += 1;
-            if mean.iter().any(|m| !m.is_finite()) {
+            if !is_kept(mean.as_slice()) {
                 episode.lost = true;
                 return episode;
             }

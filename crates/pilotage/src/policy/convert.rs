@@ -1,0 +1,356 @@
+//! From an automaton to the tables of its file and back; nothing is lost either way.
+
+use super::check::{At, Checked, Fault};
+use super::file::{
+    CoordinateTable, Ends, FilterTable, LevelTable, MapTable, MemoryTable, NodeTable,
+    ObservedTable, PolicyTable, RecallTable, Rows, SideTable, StartTable, StepTable, SwitchTable,
+    WallsTable,
+};
+use super::{Automaton, Coordinates, Node, Observed};
+use crate::belief::{Clusters, Filter, Recall, Switch};
+use crate::model::{Barriers, Interval, Region, Step, map};
+
+/// Rows of a matrix that lies row by row in `numbers`.
+fn rows(numbers: &[f64], columns: usize) -> Rows {
+    let rows = numbers.chunks(columns.max(1));
+    rows.map(<[f64]>::to_vec).collect()
+}
+
+fn ends(interval: &Interval) -> Ends {
+    [
+        (interval.low != f64::NEG_INFINITY).then_some(interval.low),
+        (interval.high != f64::INFINITY).then_some(interval.high),
+    ]
+}
+
+fn interval([low, high]: Ends) -> Interval {
+    Interval::new(
+        low.unwrap_or(f64::NEG_INFINITY),
+        high.unwrap_or(f64::INFINITY),
+    )
+}
+
+impl PolicyTable {
+    /// The tables of an automaton, which may still not be fit to be read again.
+    ///
+    /// # Errors
+    /// A fault where the automaton's levels and actions are not those of its filter.
+    pub fn new(automaton: &Automaton) -> Checked<Self> {
+        let filter = &automaton.filter;
+        Ok(Self {
+            problem: automaton.problem.clone(),
+            fingerprint: automaton.fingerprint,
+            solver: automaton.solver.clone(),
+            planned_value: automaton.planned_value,
+            states: automaton.states.clone(),
+            actions: automaton.actions.clone(),
+            modes: automaton.modes.clone(),
+            start: StartTable {
+                level: filter.start.0,
+                mode: filter.start.1,
+                mean: filter.start.2.clone(),
+            },
+            filter: FilterTable::new(filter, &automaton.levels).at("filter")?,
+            memory: memory(filter),
+            matching: automaton.matching,
+            coordinates: automaton.coordinates.as_ref().map(coordinate_tables),
+            scale: automaton.scale.clone(),
+            nodes: automaton
+                .nodes
+                .iter()
+                .map(|node| NodeTable::new(node, filter.readings))
+                .collect(),
+        })
+    }
+
+    /// The automaton that the tables describe, which have been checked.
+    ///
+    /// # Errors
+    /// A fault of the map's drawing.
+    pub fn automaton(self) -> Checked<Automaton> {
+        let levels = self.filter.levels.iter();
+        let levels = levels.map(|level| level.covariance.concat()).collect();
+        let (switches, recall) = match self.memory {
+            None => (Vec::new(), None),
+            Some(MemoryTable::Switches(switches)) => (
+                switches.into_iter().map(SwitchTable::switch).collect(),
+                None,
+            ),
+            Some(MemoryTable::Recall(recall)) => {
+                (Vec::new(), Some(recall.recall(self.actions.len())))
+            }
+        };
+        Ok(Automaton {
+            problem: self.problem,
+            fingerprint: self.fingerprint,
+            solver: self.solver,
+            matching: self.matching,
+            filter: Filter {
+                switches,
+                recall,
+                ..self.filter.filter(self.start).at("filter")?
+            },
+            states: self.states,
+            actions: self.actions,
+            modes: self.modes,
+            levels,
+            planned_value: self.planned_value,
+            coordinates: self.coordinates.map(|tables| {
+                let (names, rows) = tables
+                    .into_iter()
+                    .map(|table| (table.name, table.vector))
+                    .unzip();
+                Coordinates { names, rows }
+            }),
+            scale: self.scale,
+            nodes: self.nodes.into_iter().map(NodeTable::node).collect(),
+        })
+    }
+}
+
+impl FilterTable {
+    fn new(filter: &Filter, covariances: &[Vec<f64>]) -> Checked<Self> {
+        let (n, m, actions) = (filter.states, filter.readings, filter.actions);
+        if filter.next.len() != covariances.len() * actions {
+            return Err(Fault::new(format!(
+                "{} covariances, and the filter has {} steps of {actions} actions",
+                covariances.len(),
+                filter.next.len()
+            )))
+            .at("levels");
+        }
+        let (classes, examples) = classes(filter);
+        let step = |edge: usize| StepTable {
+            next: filter.next[edge],
+            gain: transposed(&filter.gains[edge * n * m..(edge + 1) * n * m], n),
+        };
+        let level = |(level, covariance): (usize, &Vec<f64>)| LevelTable {
+            covariance: rows(covariance, n),
+            steps: examples
+                .iter()
+                .map(|action| step(level * actions + action))
+                .collect(),
+        };
+        Ok(Self {
+            a: rows(&filter.motion, n),
+            bu: rows(&filter.displacements, n),
+            h: rows(&filter.sensor, n),
+            classes,
+            levels: covariances.iter().enumerate().map(level).collect(),
+            walls: filter.walls.as_ref().map(|walls| WallsTable {
+                bounds: walls.bounds.iter().map(ends).collect(),
+                map: walls.map.as_ref().map(|map| MapTable {
+                    cell: map.cell,
+                    rows: map.rows.clone(),
+                }),
+            }),
+        })
+    }
+
+    /// The filter without what changes modes.
+    fn filter(self, start: StartTable) -> Checked<Filter> {
+        let steps = || {
+            let levels = self.levels.iter();
+            levels.flat_map(|level| self.classes.iter().map(|class| &level.steps[*class]))
+        };
+        let n = self.a.len();
+        Ok(Filter {
+            states: n,
+            readings: self.h.len(),
+            start: (start.level, start.mode, start.mean),
+            next: steps().map(|step| step.next).collect(),
+            gains: steps().flat_map(|step| columns(&step.gain)).collect(),
+            motion: self.a.concat(),
+            displacements: self.bu.concat(),
+            sensor: self.h.concat(),
+            actions: self.bu.len(),
+            switches: Vec::new(),
+            walls: self
+                .walls
+                .map(WallsTable::barriers)
+                .transpose()
+                .at("walls")?,
+            recall: None,
+        })
+    }
+}
+
+/// The noise class of every action, and an action of every class: actions of a class lead from every level to the same one with the same
+/// gain.
+fn classes(filter: &Filter) -> (Vec<usize>, Vec<usize>) {
+    let size = filter.states * filter.readings;
+    let alike = |a: usize, b: usize| {
+        (0..filter.next.len()).step_by(filter.actions).all(|level| {
+            let (a, b) = (level + a, level + b);
+            let gain = |edge: usize| filter.gains[edge * size..(edge + 1) * size].iter();
+            filter.next[a] == filter.next[b]
+                && gain(a)
+                    .map(|x| x.to_bits())
+                    .eq(gain(b).map(|x| x.to_bits()))
+        })
+    };
+    let mut examples: Vec<usize> = Vec::new();
+    let class = |action| {
+        let known = examples.iter().position(|&example| alike(example, action));
+        known.unwrap_or_else(|| {
+            examples.push(action);
+            examples.len() - 1
+        })
+    };
+    ((0..filter.actions).map(class).collect(), examples)
+}
+
+/// Rows of a matrix that lies column by column in `numbers`.
+fn transposed(numbers: &[f64], height: usize) -> Rows {
+    let row = |row| numbers.iter().skip(row).step_by(height).copied().collect();
+    (0..height).map(row).collect()
+}
+
+/// The numbers of a matrix, column by column.
+fn columns(rows: &Rows) -> impl Iterator<Item = f64> {
+    let width = rows.first().map_or(0, Vec::len);
+    (0..width).flat_map(move |column| rows.iter().map(move |row| row[column]))
+}
+
+impl WallsTable {
+    fn barriers(self) -> Checked<Barriers> {
+        let map = self.map.map(|table| {
+            let drawn = map::draw(&table.rows.join("\n"), table.cell);
+            drawn.map_err(|fault| {
+                // The drawing says the row; a cell is a number of its own.
+                let rows = fault.path.steps().iter().find_map(|step| match step {
+                    Step::Index(row) => Some(*row),
+                    Step::Key(_) => None,
+                });
+                let place = rows.map_or(String::new(), |row| format!("in row {row}, "));
+                Fault::new(format!("{place}{}", fault.message))
+            })
+        });
+        Ok(Barriers {
+            bounds: self.bounds.into_iter().map(interval).collect(),
+            map: map.transpose().at("rows").at("map")?,
+        })
+    }
+}
+
+/// How the mode changes; `None` where it does not.
+fn memory(filter: &Filter) -> Option<MemoryTable> {
+    if let Some(recall) = &filter.recall {
+        return Some(MemoryTable::Recall(RecallTable::new(recall)));
+    }
+    let switches = filter.switches.iter().map(SwitchTable::new);
+    let switches: Vec<SwitchTable> = switches.collect();
+    (!switches.is_empty()).then_some(MemoryTable::Switches(switches))
+}
+
+impl SwitchTable {
+    fn new(switch: &Switch) -> Self {
+        let side = |(state, within): &(usize, Interval)| SideTable {
+            state: *state,
+            within: ends(within),
+        };
+        Self {
+            actions: switch.actions.clone(),
+            mode: switch.mode,
+            region: switch.region.sides.iter().map(side).collect(),
+            when: switch.when,
+            becomes: switch.becomes,
+        }
+    }
+
+    fn switch(self) -> Switch {
+        let sides = self.region.into_iter();
+        Switch {
+            actions: self.actions,
+            mode: self.mode,
+            region: Region {
+                sides: sides
+                    .map(|side| (side.state, interval(side.within)))
+                    .collect(),
+            },
+            when: self.when,
+            becomes: self.becomes,
+        }
+    }
+}
+
+impl RecallTable {
+    fn new(recall: &Recall) -> Self {
+        let clusters = &recall.clusters;
+        let actions = |mode: &[usize]| {
+            let actions = mode.chunks(clusters.len());
+            actions.map(<[usize]>::to_vec).collect()
+        };
+        Self {
+            bounds: clusters
+                .bounds
+                .iter()
+                .map(|bounds| [bounds.low, bounds.high])
+                .collect(),
+            centres: clusters.centres.clone(),
+            first: recall.first.clone(),
+            next: recall
+                .next
+                .chunks(recall.actions * clusters.len())
+                .map(actions)
+                .collect(),
+        }
+    }
+
+    fn recall(self, actions: usize) -> Recall {
+        let bounds = self.bounds.into_iter();
+        Recall {
+            clusters: Clusters {
+                bounds: bounds.map(|[low, high]| Interval::new(low, high)).collect(),
+                centres: self.centres,
+            },
+            actions,
+            first: self.first,
+            next: self.next.into_iter().flatten().flatten().collect(),
+        }
+    }
+}
+
+fn coordinate_tables(coordinates: &Coordinates) -> Vec<CoordinateTable> {
+    let pairs = coordinates.names.iter().zip(&coordinates.rows);
+    pairs
+        .map(|(name, vector)| CoordinateTable {
+            name: name.clone(),
+            vector: vector.clone(),
+        })
+        .collect()
+}
+
+impl NodeTable {
+    fn new(node: &Node, readings: usize) -> Self {
+        Self {
+            levels: [node.levels.0, node.levels.1],
+            mode: node.mode,
+            place: node.place.clone(),
+            action: node.action,
+            value: node.value,
+            visits: node.visits,
+            predecessors: node.predecessors.clone(),
+            observed: node.observed.as_ref().map(|observed| ObservedTable {
+                mean: observed.mean.clone(),
+                covariance: rows(&observed.covariance, readings),
+            }),
+        }
+    }
+
+    fn node(self) -> Node {
+        Node {
+            levels: self.levels.into(),
+            mode: self.mode,
+            place: self.place,
+            action: self.action,
+            value: self.value,
+            observed: self.observed.map(|observed| Observed {
+                mean: observed.mean,
+                covariance: observed.covariance.concat(),
+            }),
+            predecessors: self.predecessors,
+            visits: self.visits,
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! The policy file as it is written, format 2. The documentation of these tables is the documentation of the format: it goes into the
+//! JSON schema word for word. What they mean together is in `docs/policy-format.md`.
+
+use schemars::{JsonSchema, Schema};
+use serde::{Deserialize, Serialize};
+
+use super::{Matching, Place};
+use crate::model::{Fingerprint, When};
+
+/// Version of the file format; a file of another is refused.
+pub(super) const FORMAT: u64 = 2;
+
+/// A matrix, row by row: `[[1.0, 0.5], [0.0, 1.0]]`.
+pub(super) type Rows = Vec<Vec<f64>>;
+
+/// JSON schema of policy files, for programs that read them and for people.
+pub fn schema() -> Schema {
+    schemars::schema_for!(File<PolicyTable>)
+}
+
+/// A policy for acting under uncertainty: a filter that keeps a belief, and a finite automaton that says what to do at it.
+///
+/// With n state variables and m sensor readings. Whatever refers to something by number counts from 0, in the order of the list that it
+/// refers to. A matrix is a list of its rows. No number is larger than 1e60 in magnitude.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+#[schemars(title = "pilotage policy file")]
+pub(super) struct File<P> {
+    /// Version of this format: 2.
+    #[schemars(range(min = 2, max = 2))]
+    pub format: u64,
+    /// Version of pilotage that wrote the file.
+    pub pilotage: String,
+    /// `fnv1a64-` and 16 hexadecimal digits: the 64-bit FNV-1a hash of the text of the value of `policy`, in UTF-8, without the white space
+    /// between its tokens.
+    #[schemars(regex(pattern = r"^fnv1a64-[0-9a-f]{16}$"))]
+    pub checksum: String,
+    /// The policy.
+    pub policy: P,
+}
+
+/// The policy.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct PolicyTable {
+    /// Name of the problem it was made for.
+    pub problem: String,
+    /// Fingerprint of that problem, which changes when anything changes that a policy depends on.
+    #[schemars(with = "String", regex(pattern = r"^v[0-9]+-[0-9a-f]{16}$"))]
+    pub fingerprint: Fingerprint,
+    /// Name of the solver that made it.
+    pub solver: String,
+    /// Return that the solver expects from the start, where it knows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub planned_value: Option<f64>,
+    /// Names of the state variables, n of them.
+    #[schemars(length(min = 1))]
+    pub states: Vec<String>,
+    /// Names of the actions.
+    #[schemars(length(min = 1))]
+    pub actions: Vec<String>,
+    /// Names of the modes: hidden modes of the world, or what is remembered. Where there is only one its name may be empty.
+    #[schemars(length(min = 1))]
+    pub modes: Vec<String>,
+    /// The belief before anything was observed.
+    pub start: StartTable,
+    /// How the belief follows actions and readings.
+    pub filter: FilterTable,
+    /// How the mode follows them. Default: it stays as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<MemoryTable>,
+    /// How a belief finds its node among the candidates.
+    pub matching: Matching,
+    /// Coordinates of the mean in which the places of nodes are stated, at most 8. Default: the state variables.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1, max = 8))]
+    pub coordinates: Option<Vec<CoordinateTable>>,
+    /// What distances are divided by, more than 0: a number for each coordinate.
+    pub scale: Vec<f64>,
+    /// The nodes, at least one.
+    #[schemars(length(min = 1))]
+    pub nodes: Vec<NodeTable>,
+}
+
+/// A belief: how uncertain, in which mode, where.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct StartTable {
+    /// Uncertainty level.
+    pub level: usize,
+    /// Mode.
+    pub mode: usize,
+    /// Mean, n numbers.
+    pub mean: Vec<f64>,
+}
+
+/// A Kalman filter whose covariances were computed beforehand.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct FilterTable {
+    /// How the state moves on its own, n x n.
+    #[serde(rename = "A")]
+    pub a: Rows,
+    /// By action: how far it moves the state, n numbers.
+    #[serde(rename = "Bu")]
+    pub bu: Rows,
+    /// What is sensed of the state, m x n.
+    #[serde(rename = "H")]
+    pub h: Rows,
+    /// By action: its noise class. Actions of a class disturb state and sensor alike.
+    pub classes: Vec<usize>,
+    /// The uncertainty levels.
+    #[schemars(length(min = 1))]
+    pub levels: Vec<LevelTable>,
+    /// The walls that the belief knows of. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub walls: Option<WallsTable>,
+}
+
+/// An uncertainty level.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct LevelTable {
+    /// Covariance of the belief, n x n. Running the policy does not need it.
+    pub covariance: Rows,
+    /// By noise class: what a step does.
+    #[schemars(length(min = 1))]
+    pub steps: Vec<StepTable>,
+}
+
+/// What a step does at a level.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct StepTable {
+    /// The level afterwards.
+    pub next: usize,
+    /// Gain K, n x m.
+    pub gain: Rows,
+}
+
+/// Walls at which the mean stops.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct WallsTable {
+    /// By state variable: lower and upper end of the world; `null` where there is none.
+    pub bounds: Vec<Ends>,
+    /// Walls inside the plane of the first two state variables, whose bounds then do not count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<MapTable>,
+}
+
+/// A map drawn as text, its bottom left corner at (0, 0).
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct MapTable {
+    /// Side of a cell, more than 0.
+    pub cell: f64,
+    /// The drawing, top row first.
+    pub rows: Vec<String>,
+}
+
+/// How the mode changes.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "lowercase")]
+pub(super) enum MemoryTable {
+    /// By the first of these that applies.
+    Switches(Vec<SwitchTable>),
+    /// By table.
+    Recall(RecallTable),
+}
+
+/// A change of mode.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct SwitchTable {
+    /// Actions it happens on. Default: all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub actions: Option<Vec<usize>>,
+    /// Mode it happens in. Default: any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mode: Option<usize>,
+    /// Where the mean must be: within all of these sides. Default: anywhere.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub region: Vec<SideTable>,
+    /// Whether the mean must be there before the step, or after it. Changes before come first.
+    #[schemars(with = "Moment")]
+    pub when: When,
+    /// Mode afterwards.
+    pub becomes: usize,
+}
+
+/// When a mean is looked at.
+#[derive(JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[allow(dead_code, reason = "it describes `When` in the words of this format")]
+enum Moment {
+    /// When the action is taken.
+    Before,
+    /// Once what it brought has been sensed.
+    After,
+}
+
+/// A side of a region.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct SideTable {
+    /// State variable.
+    pub state: usize,
+    /// It is at least the first and less than the second; `null` where there is no such end.
+    pub within: Ends,
+}
+
+/// A table of modes.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct RecallTable {
+    /// By state variable: lower and upper end of the world, by which distances are measured.
+    pub bounds: Vec<[f64; 2]>,
+    /// By cluster: its centre, n numbers. A mean is in the cluster whose centre is nearest.
+    #[schemars(length(min = 1))]
+    pub centres: Vec<Vec<f64>>,
+    /// By cluster: the mode of an episode that starts in it. The start above has it already.
+    pub first: Vec<usize>,
+    /// By mode, then action, then cluster of the new mean: the mode afterwards.
+    pub next: Vec<Vec<Vec<usize>>>,
+}
+
+/// A coordinate of the mean.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct CoordinateTable {
+    /// What it is called.
+    pub name: String,
+    /// The vector w, n numbers; the coordinate of a mean m is w . m.
+    pub vector: Vec<f64>,
+}
+
+/// A node of the automaton.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct NodeTable {
+    /// First and last uncertainty level it stands for.
+    pub levels: [usize; 2],
+    /// Mode it belongs to.
+    pub mode: usize,
+    /// Where it is among the means of its levels.
+    pub place: Place,
+    /// What to do.
+    pub action: usize,
+    /// Return expected from the node, where the solver knows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// Share of all steps that were spent in it while the policy was tried, from 0 to 1.
+    pub visits: f64,
+    /// Pairs of a node that it was reached from and how often, not negative, in falling order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub predecessors: Vec<(usize, f64)>,
+    /// What was sensed on arriving, where it was visited.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observed: Option<ObservedTable>,
+}
+
+/// What is sensed on arriving at a node.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct ObservedTable {
+    /// Mean, m numbers.
+    pub mean: Vec<f64>,
+    /// Covariance, m x m.
+    pub covariance: Rows,
+}
+
+/// Lower and upper end, `null` where there is none.
+pub(super) type Ends = [Option<f64>; 2];

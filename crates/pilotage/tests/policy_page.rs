@@ -1,0 +1,333 @@
+//! docs/policy-format.md is enough to run a policy: the program that was written from it alone does what the library does.
+//!
+//! Where there is no Python 3 the comparisons say so and are left out.
+#![allow(clippy::print_stdout, clippy::unwrap_used)]
+
+mod common;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use common::automata::any_automaton;
+use common::scenario;
+use pilotage::model::Then;
+use pilotage::observe::Silent;
+use pilotage::policy::{Automaton, Controller};
+use pilotage::random::{Role, normal, stream};
+use pilotage::scenario::Scenario;
+use pilotage::solve::{Arkaq, Form, Kafaq, PolicySearch, Registry, Request, Solver, solve};
+use pilotage::world::{Draws, ProblemWorld, World};
+use proptest::prelude::*;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn page() -> String {
+    std::fs::read_to_string(root().join("docs/policy-format.md")).unwrap()
+}
+
+/// The block of the page that begins with so many backticks and this word.
+fn block(page: &str, word: &str) -> String {
+    let (_, rest) = page.split_once(&format!("```{word}\n")).unwrap();
+    rest.split_once("```").unwrap().0.to_owned()
+}
+
+/// A step of a runner: belief, node and action.
+#[derive(Debug, PartialEq)]
+struct Row {
+    level: usize,
+    mode: usize,
+    mean: Vec<f64>,
+    node: usize,
+    action: String,
+}
+
+/// What follows a step: a reading, or a new episode.
+type Event = Option<Vec<f64>>;
+
+/// The rows of the library's own runner.
+fn run(automaton: &Automaton, events: &[Event]) -> Vec<Row> {
+    let mut controller = Controller::new(automaton);
+    let row = |controller: &Controller| {
+        let (belief, (node, action)) = (controller.belief(), controller.decide());
+        let row = Row {
+            level: belief.level,
+            mode: belief.mode,
+            mean: belief.mean.clone(),
+            node,
+            action: automaton.actions[action].clone(),
+        };
+        (row, action)
+    };
+    let (first, mut action) = row(&controller);
+    let mut rows = vec![first];
+    for event in events {
+        match event {
+            Some(reading) => controller.observe(action, reading),
+            None => controller.reset(),
+        }
+        let (next, decided) = row(&controller);
+        rows.push(next);
+        action = decided;
+    }
+    rows
+}
+
+/// The text of the page's runner; `None` where there is no Python 3.
+fn run_page(automaton: &Automaton, events: &[Event]) -> Option<String> {
+    let version = Command::new("python3").arg("--version").output();
+    if !version.is_ok_and(|version| version.status.success()) {
+        println!("left out: there is no python3 here");
+        return None;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let policy = folder.path().join("policy.json");
+    automaton.save(&policy).unwrap();
+    let mut child = Command::new("python3")
+        .arg("-B")
+        .arg(root().join("scripts/run_policy.py"))
+        .arg(&policy)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut readings = String::new();
+    for event in events {
+        let line = match event {
+            Some(reading) => {
+                let numbers: Vec<String> = reading.iter().map(f64::to_string).collect();
+                numbers.join(",")
+            }
+            None => "start".to_owned(),
+        };
+        readings.push_str(&line);
+        readings.push('\n');
+    }
+    let mut stdin = child.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || stdin.write_all(readings.as_bytes()));
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap().unwrap();
+    assert!(output.status.success());
+    Some(String::from_utf8(output.stdout).unwrap())
+}
+
+fn rows(csv: &str, states: usize) -> Vec<Row> {
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let index = |cell: &str| cell.parse().unwrap();
+        let (mean, rest) = cells[3..].split_at(states);
+        Row {
+            level: index(cells[1]),
+            mode: index(cells[2]),
+            mean: mean.iter().map(|x| x.parse().unwrap()).collect(),
+            node: index(rest[0]),
+            action: rest[1].to_owned(),
+        }
+    };
+    csv.lines().skip(1).map(row).collect()
+}
+
+/// The same nodes and actions at every step, means equal to 1e-12.
+fn compare(automaton: &Automaton, events: &[Event]) {
+    let library = run(automaton, events);
+    let Some(csv) = run_page(automaton, events) else {
+        return;
+    };
+    let page = rows(&csv, automaton.states.len());
+    assert_eq!(library.len(), page.len());
+    for (step, (ours, theirs)) in library.iter().zip(&page).enumerate() {
+        let apart = ours.mean.iter().zip(&theirs.mean);
+        let apart = apart.map(|(a, b)| (a - b).abs() / a.abs().max(1.0));
+        assert!(
+            apart.fold(0.0, f64::max) <= 1e-12
+                && (ours.level, ours.mode, ours.node) == (theirs.level, theirs.mode, theirs.node)
+                && ours.action == theirs.action,
+            "{} by {}, step {step}: {ours:?}, and by the page {theirs:?}",
+            automaton.problem,
+            automaton.solver
+        );
+    }
+}
+
+/// What the world of a scenario lets an automaton sense in so many steps.
+fn events(scenario: &Scenario, automaton: &Automaton, steps: usize) -> Vec<Event> {
+    let mut world = ProblemWorld::new(scenario);
+    let mut controller = Controller::new(automaton);
+    let mut draws = Draws::new(4, 0);
+    let mut observation = vec![0.0; automaton.filter.readings()];
+    world.reset(&mut draws);
+    let mut events = Vec::new();
+    let mut age = 0;
+    for _ in 0..steps {
+        let (_, action) = controller.decide();
+        let step = world.step(action, &mut draws, &mut observation);
+        age += 1;
+        let over = step.then == Then::End || age == 40;
+        if over {
+            world.reset(&mut draws);
+            age = 0;
+        }
+        if over || step.then == Then::Restart {
+            controller.reset();
+            events.push(None);
+        } else {
+            controller.observe(action, &observation);
+            events.push(Some(observation.clone()));
+        }
+    }
+    events
+}
+
+fn solver(name: &str) -> Solver {
+    match name {
+        "kafaq" => Solver::learner(Kafaq {
+            epoch: 1_000,
+            epoch_per_cell: 2,
+            epoch_limit: 6,
+            trial: 20,
+            cells_along: 32,
+            ..Default::default()
+        }),
+        "arkaq" => Solver::learner(Arkaq {
+            vigilances: vec![0.6],
+            epoch: 500,
+            epoch_per_entry: 1,
+            epoch_limit: 4,
+            settle: 300,
+            trial: 10,
+            ..Default::default()
+        }),
+        "policy-search" => Solver::planner(PolicySearch {
+            effort: 0.01,
+            ..Default::default()
+        }),
+        other => Registry::builtin()
+            .find(other)
+            .unwrap()
+            .solver(&[])
+            .unwrap(),
+    }
+}
+
+fn solved(scenario: &Scenario, name: &str, form: Form) -> Automaton {
+    let request = Request {
+        runs: 50,
+        ..Request::form(form)
+    };
+    let solution = solve(&solver(name), scenario, &request, &Silent).unwrap();
+    solution.automaton().unwrap().clone()
+}
+
+/// The corridor with an action that does not disturb the state: two noise classes.
+fn still() -> Scenario {
+    let mut scenario = scenario("corridor");
+    let noise = &scenario.model.motion.noise * 0.0;
+    scenario.model.actions[2].motion_noise = Some(noise);
+    scenario
+}
+
+/// One of everything that a file can say, found on the way.
+#[test]
+fn the_page_runs_policies_as_the_library_does() {
+    use Form::{Nearest, Segments};
+    let mut said = [false; 8];
+    for (scenario, kind, form) in [
+        (scenario("corridor"), "value-iteration", Nearest),
+        (scenario("corridor-declare"), "value-iteration", Segments),
+        (still(), "value-iteration", Nearest),
+        (scenario("tiger"), "value-iteration", Nearest),
+        (scenario("load-unload"), "value-iteration", Nearest),
+        (scenario("shuttle"), "value-iteration", Segments),
+        (scenario("maze-2d"), "value-iteration", Nearest),
+        (scenario("u-maze"), "value-iteration", Segments),
+        (scenario("cart-pole"), "policy-search", Nearest),
+        (scenario("cart-load-unload"), "kafaq", Segments),
+        (scenario("cart-load-unload"), "arkaq", Nearest),
+        (scenario("cart-pole-sd"), "kafaq", Segments),
+    ] {
+        let automaton = solved(&scenario, kind, form);
+        compare(&automaton, &events(&scenario, &automaton, 400));
+        let file: serde_json::Value = serde_json::from_str(&automaton.to_json().unwrap()).unwrap();
+        let policy = &file["policy"];
+        for (said, says) in said.iter_mut().zip([
+            policy["matching"] == "segments",
+            policy["coordinates"].is_array(),
+            policy["memory"]["switches"].is_array(),
+            policy["memory"]["recall"].is_object(),
+            policy["filter"]["walls"]["bounds"].is_array(),
+            policy["filter"]["walls"]["map"]["rows"].is_array(),
+            policy["scale"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .any(|s| *s != 1.0),
+            policy["filter"]["classes"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .any(|c| *c != 0),
+        ]) {
+            *said |= says;
+        }
+    }
+    assert_eq!(said, [true; 8]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    /// Automata that nobody would make, on readings from everywhere: walls on the way, levels and modes without nodes, means far away.
+    #[test]
+    fn the_page_runs_any_automaton_as_the_library_does(
+        automaton in any_automaton(-5.0..5.0_f64, 1..20),
+        seed in any::<u64>(),
+    ) {
+        let mut rng = stream(seed, 0, Role::Sensor);
+        let events: Vec<Event> = (0..200)
+            .map(|step| {
+                let spread = if step % 9 == 0 { 1e3 } else { 1.5 };
+                let reading = (0..automaton.filter.readings()).map(|_| 1.0 + spread * normal(&mut rng));
+                (step % 50 != 49).then(|| reading.collect())
+            })
+            .collect();
+        compare(&automaton, &events);
+    }
+}
+
+/// The example of the page is a policy, and does what the page says.
+#[test]
+fn the_example_of_the_page_is_true() {
+    let page = page();
+    let automaton = Automaton::from_json(&block(&page, "json"), "docs/policy-format.md").unwrap();
+    let events = [Some(vec![2.0]), Some(vec![3.0]), Some(vec![2.5])];
+    let says = block(&page, "csv");
+    assert_eq!(rows(&says, 1), run(&automaton, &events));
+    if let Some(csv) = run_page(&automaton, &events) {
+        assert_eq!(says, csv);
+    }
+}
+
+/// Every key of the format is explained by the page.
+#[test]
+fn the_page_names_every_key() {
+    fn keys(schema: &serde_json::Value, found: &mut Vec<String>) {
+        match schema {
+            serde_json::Value::Object(object) => {
+                if let Some(serde_json::Value::Object(properties)) = object.get("properties") {
+                    found.extend(properties.keys().cloned());
+                }
+                object.values().for_each(|value| keys(value, found));
+            }
+            serde_json::Value::Array(list) => list.iter().for_each(|value| keys(value, found)),
+            _ => {}
+        }
+    }
+    let page = page();
+    let mut found = Vec::new();
+    keys(pilotage::policy::schema().as_value(), &mut found);
+    for key in found {
+        assert!(page.contains(&key), "{key}");
+    }
+}
