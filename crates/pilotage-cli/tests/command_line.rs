@@ -280,7 +280,14 @@ fn what_cannot_be_done_is_one_message() {
             "effort=",
         ),
         (
-            &["solve", "scalar-lqg", "--out", &at("control.json")],
+            &[
+                "solve",
+                "scalar-lqg",
+                "--with",
+                "lqg",
+                "--out",
+                &at("control.json"),
+            ],
             "lqg finds a free control for scalar-lqg",
         ),
         (

@@ -226,14 +226,18 @@ fn every_model_has_a_solver_and_every_solver_a_model() {
         assert_eq!((solver.name(), solver.learns()), (name, entry.learns()));
         assert!(!entry.about().is_empty());
     }
-    for (model, first) in [
+    let first = |model: &Model| registry.first_for(model).unwrap().name();
+    for (name, expected) in [
         ("corridor", "value-iteration"),
         ("cart-pole", "policy-search"),
         ("scalar-lqg", "value-iteration"),
     ] {
-        let model = scenario::find(model).unwrap().model;
-        assert_eq!(registry.first_for(&model).unwrap().name(), first);
+        assert_eq!(first(&scenario::find(name).unwrap().model), expected);
     }
+    // A cost alone, and nowhere to put a grid.
+    let mut free = scenario::find("scalar-lqg").unwrap().model;
+    free.state[0].bounds = Interval::ALL;
+    assert_eq!(first(&free), "lqg");
 }
 
 #[test]

@@ -159,7 +159,8 @@ pub struct Problem {
 }
 
 impl Problem {
-    pub(super) fn new(model: &Model, request: &Request) -> Self {
+    /// The problem of a model, with what is asked of its solver.
+    pub fn new(model: &Model, request: &Request) -> Self {
         Self {
             mdp: BeliefMdp::new(model),
             form: request.form,
