@@ -24,7 +24,7 @@ const SOLVER: &str = "kbvi";
 /// The planner of open-loop branches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Kbvi {
-    /// First horizon tried, in steps; 0 to 1000.
+    /// First horizon tried, in steps; at most 1000.
     pub first_horizon: usize,
     /// Last horizon tried; at least the first, at most 1000.
     pub last_horizon: usize,
