@@ -32,7 +32,7 @@ pub struct Kbvi {
     pub repeats: usize,
     /// Steps for which an action is kept once chosen; at least 1.
     pub group: usize,
-    /// Runs of the agent for each horizon; 1 to a million. (Figure 5.8 makes one.)
+    /// Runs of the agent for each horizon; at least 1, at most a million. (Figure 5.8 makes one.)
     pub runs: usize,
     /// Whether it looks less far ahead with every step of an episode, as in Figure 5.8: `true` or `false`.
     pub decreasing: bool,
