@@ -84,7 +84,7 @@ impl StateMdp {
     /// Solves the decision process of true states that underlies a belief decision process.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] and [`Error::OutOfMemory`] where the grid does not fit the memory, [`Error::Setting`] for settings out of range.
+    /// [`crate::Error::TooLarge`] and [`crate::Error::OutOfMemory`] where the grid does not fit the memory, [`crate::Error::Setting`] for settings out of range.
     pub fn solve(
         belief_mdp: &BeliefMdp,
         settings: &Settings,
@@ -285,7 +285,7 @@ fn seen(model: &Model, mode: ModeId, state: &[f64], action: ActionId) -> (f64, O
 /// Whether a planner on true states is made for such a model.
 ///
 /// # Errors
-/// [`Error::Unsupported`] in the planner's name, with the reason and what would do.
+/// [`crate::Error::Unsupported`] in the planner's name, with the reason and what would do.
 pub fn accepts(solver: &'static str, model: &Model) -> Result<()> {
     let (n, most) = (model.state_dim(), MOST_VARIABLES);
     let too_many = || {

@@ -197,8 +197,7 @@ fn policies() -> Reader {
         name: "policies",
         corpus: automata.iter().map(text).collect(),
         read: Box::new(move |bytes| {
-            let Ok(automaton) = Automaton::from_json(&String::from_utf8_lossy(bytes), "input")
-            else {
+            let Ok(automaton) = Automaton::from_json(&sealed_policy(bytes), "input") else {
                 return false;
             };
             use_policy(&automaton);
@@ -328,6 +327,26 @@ macro_rules! checkpoints {
 checkpoints!(checkpoints_of_kafaq, kafaq, kafaq_settings);
 checkpoints!(checkpoints_of_arkaq, arkaq, arkaq_settings);
 
+/// A policy file with the checksum that belongs to what it has become: FNV-1a over the policy without white space between its values.
+fn sealed_policy(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes).into_owned();
+    let Ok(mut file) = serde_json::from_str::<serde_json::Value>(&text) else {
+        return text;
+    };
+    let (Some(policy), true) = (file.get("policy"), file.get("checksum").is_some()) else {
+        return text;
+    };
+    let checksum = fnv1a64(policy.to_string().as_bytes());
+    file["checksum"] = format!("fnv1a64-{checksum:016x}").into();
+    file.to_string()
+}
+
+fn fnv1a64(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
 /// A checkpoint with the checksum that belongs to what it has become, as someone would write it who means harm.
 pub fn sealed(bytes: &[u8]) -> Vec<u8> {
     let text = String::from_utf8_lossy(bytes).into_owned();
@@ -338,9 +357,7 @@ pub fn sealed(bytes: &[u8]) -> Vec<u8> {
         return bytes.to_vec();
     };
     let state = state.trim_end_matches('\n');
-    let checksum = state.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    });
+    let checksum = fnv1a64(state.as_bytes());
     if let Some(sum) = header.get_mut("checksum") {
         *sum = format!("fnv1a64-{checksum:016x}").into();
     }

@@ -33,8 +33,8 @@ const FREQUENT: f64 = 1e-5;
 /// Plans a policy that stays within the model's failure limits.
 ///
 /// # Errors
-/// [`Error::Unsupported`] for a model without limits around the origin, with several modes or hypotheses to track, or with
-/// actions that differ in their noise; [`Error::Setting`] for settings out of range; as [`lqr_gain`] where the limits cannot be
+/// [`crate::Error::Unsupported`] for a model without limits around the origin, with several modes or hypotheses to track, or with
+/// actions that differ in their noise; [`crate::Error::Setting`] for settings out of range; as [`lqr_gain`] where the limits cannot be
 /// kept by any control.
 pub fn search(
     mdp: &BeliefMdp,

@@ -51,11 +51,11 @@ pub struct GridPolicy {
     pub sweeps: usize,
 }
 
-/// Plans by value iteration, for the length of an episode where that matters (see [`super::horizon`]).
+/// Plans by value iteration, for the length of an episode where that matters.
 ///
 /// # Errors
-/// [`Error::TooLarge`] and [`Error::OutOfMemory`] where the grid does not fit the memory, [`Error::Setting`] for settings out of range,
-/// [`Error::Unsupported`] where the grid does not see what is paid, [`Error::NotFinite`] where numbers grow beyond all bounds.
+/// [`crate::Error::TooLarge`] and [`crate::Error::OutOfMemory`] where the grid does not fit the memory, [`crate::Error::Setting`] for settings out of range,
+/// [`crate::Error::Unsupported`] where the grid does not see what is paid, [`crate::Error::NotFinite`] where numbers grow beyond all bounds.
 pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> Result<GridPolicy> {
     settings.validate()?;
     let mut policy = super::horizon::plan(mdp, settings, observer)?;
