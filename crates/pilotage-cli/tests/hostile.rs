@@ -198,6 +198,20 @@ fn a_wrong_name_for_the_output_is_known_before_the_work_is_done() {
 }
 
 /// A learner writes its checkpoint all the time; whenever it is ended, by whatever signal, nothing else is left behind.
+/// The program, told to hear signals that whoever started the tests may ignore, as `nohup` does.
+fn hearing_signals(folder: &Path, arguments: &[&str]) -> Command {
+    if !cfg!(target_os = "linux") {
+        return pilotage(folder, arguments);
+    }
+    let mut command = Command::new("env");
+    command
+        .arg("--default-signal=HUP,INT,TERM")
+        .arg(env!("CARGO_BIN_EXE_pilotage"))
+        .args(arguments)
+        .current_dir(folder);
+    command
+}
+
 #[test]
 fn signals_leave_no_temporary_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -224,7 +238,7 @@ fn signals_leave_no_temporary_files() {
         .take(16)
         .enumerate()
     {
-        let mut child = pilotage(here, &learn)
+        let mut child = hearing_signals(here, &learn)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
@@ -234,7 +248,18 @@ fn signals_leave_no_temporary_files() {
             here,
             &["kill", "-s", signal, &child.id().to_string()]
         ));
-        assert!(!child.wait().unwrap().success());
+        let clock = Instant::now();
+        let ended = loop {
+            match child.try_wait().unwrap() {
+                Some(status) => break status,
+                None if clock.elapsed() > Duration::from_secs(30) => {
+                    child.kill().unwrap();
+                    panic!("{signal} did not end it");
+                }
+                None => std::thread::sleep(Duration::from_millis(5)),
+            }
+        };
+        assert!(!ended.success());
         let left = listing(here);
         assert!(left.iter().all(|name| name == "run.json"), "{left:?}");
     }
