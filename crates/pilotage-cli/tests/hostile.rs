@@ -51,7 +51,7 @@ fn solve_to(folder: &Path, out: &str) -> Output {
 }
 
 fn is_policy(text: &str) -> bool {
-    text.contains("\"automaton\"")
+    text.contains("\"policy\"")
 }
 
 /// Names of what lies in a folder.
@@ -213,6 +213,8 @@ fn signals_leave_no_temporary_files() {
         "epoch_per_cell=1",
         "--learn",
         "epoch_limit=100000",
+        "--learn",
+        "calm=1000000",
         "--checkpoint",
         "run.json",
     ];
@@ -270,7 +272,7 @@ fn extreme_settings_are_refused_by_name() {
         (&["--threads", MAX], "at most 1024"),
         (
             &["--with", "policy-search", "--effort", "nan"],
-            "above 0, at most 1000",
+            "out of range",
         ),
         (
             &["--with", "policy-search", "--effort", "0"],
@@ -278,7 +280,7 @@ fn extreme_settings_are_refused_by_name() {
         ),
         (
             &["--with", "policy-search", "--effort", "inf"],
-            "above 0, at most 1000",
+            "out of range",
         ),
         (
             &["--with", "policy-search", "--effort", "1e300"],
@@ -286,6 +288,35 @@ fn extreme_settings_are_refused_by_name() {
         ),
         (&["--grid", "0"], "points = 0 is out of range"),
         (&["--grid", "1"], "points = 1 is out of range"),
+        (
+            &["--runs", MAX],
+            "runs = 18446744073709551615 is out of range",
+        ),
+        (
+            &["--with", "kbvi", "--runs", MAX],
+            "runs = 18446744073709551615 is out of range",
+        ),
+        (
+            &[
+                "--with",
+                "kbvi",
+                "--first-horizon",
+                MAX,
+                "--last-horizon",
+                MAX,
+            ],
+            "first_horizon = 18446744073709551615 is out of range",
+        ),
+        (
+            &["--with", "kbvi", "--last-horizon", MAX],
+            "last_horizon = 18446744073709551615 is out of range",
+        ),
+        (&["--grid", "100000000"], "more than the 1024 MiB allowed"),
+        (&["--grid", MAX, "--memory", MAX], "MiB are free here"),
+        (
+            &["--with", "mls", "--grid", "100000000000", "--memory", MAX],
+            "MiB are free here",
+        ),
         (
             &["--with", "qmdp", "--grid", "0"],
             "points = 0 is out of range",
@@ -376,6 +407,83 @@ fn a_path_that_is_not_utf8_is_a_path() {
         names.contains(&OsStr::from_bytes(b"p\xfe-map.svg").to_owned()),
         "{names:?}"
     );
+}
+
+/// What is written into a model file in the place of something else, and what the program says to it.
+#[test]
+fn models_beyond_all_numbers_are_refused_by_every_verb() {
+    let folder = tempfile::tempdir().unwrap();
+    for (base, good, bad, says) in [
+        (
+            "corridor",
+            "H = [[1.0]]",
+            "H = [[-1e308]]",
+            "uncertainty level 0",
+        ),
+        (
+            "cart-pole",
+            "step = 0.02",
+            "step = 9.0",
+            "the smallest eigenvalue",
+        ),
+        (
+            "cart-pole",
+            "gravity = 9.8",
+            "gravity = 1e307",
+            "shorter `step`",
+        ),
+        (
+            "corridor",
+            "name = \"corridor\"",
+            "name = \"\\u001b[31mred\"",
+            "\\u{1b}",
+        ),
+        (
+            "scalar-lqg",
+            "length = 10",
+            "length = 1000000000000",
+            "a gain for every step",
+        ),
+    ] {
+        let model = built_in(base);
+        assert!(model.contains(good), "{good}");
+        fs::write(folder.path().join("m.toml"), model.replacen(good, bad, 1)).unwrap();
+        for solver in ["kbvi-closed", "lqg", "kafaq", "arkaq"] {
+            if base == "scalar-lqg" && solver != "lqg" {
+                continue;
+            }
+            refused(folder.path(), &["solve", "m.toml", "--with", solver], says);
+        }
+        if base != "scalar-lqg" {
+            refused(folder.path(), &["check", "m.toml"], says);
+        }
+    }
+}
+
+#[test]
+fn a_hundred_thousand_levels_are_checked_and_planned_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let many = "level_tolerance = 0.0\nlevel_limit = 100000";
+    let model = built_in("tiger").replacen("level_tolerance = 1e-4", many, 1);
+    fs::write(folder.path().join("many.toml"), model).unwrap();
+    let clock = Instant::now();
+    for arguments in [
+        &["check", "many.toml"][..],
+        &[
+            "solve",
+            "many.toml",
+            "--grid",
+            "2",
+            "--runs",
+            "10",
+            "--episodes",
+            "10",
+        ],
+    ] {
+        let output = pilotage(folder.path(), arguments).output().unwrap();
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    }
+    assert!(clock.elapsed() < Duration::from_secs(30));
 }
 
 /// A policy names its problem; that is no reason to read whatever file it names.

@@ -157,7 +157,7 @@ fn what_was_learned_is_kept_run_and_drawn() {
     assert_eq!(simulated["evaluation"], solved["evaluation"]);
     let policy: Value =
         serde_json::from_slice(&std::fs::read(here.join("cart.json")).unwrap()).unwrap();
-    let nodes = policy["automaton"]["nodes"].as_array().unwrap();
+    let nodes = policy["policy"]["nodes"].as_array().unwrap();
     let visits: f64 = nodes
         .iter()
         .map(|node| node["visits"].as_f64().unwrap())

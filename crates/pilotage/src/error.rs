@@ -123,6 +123,20 @@ pub enum Error {
         /// Memory allowed, MiB.
         limit: u64,
     },
+    /// The problem needs more memory than there is.
+    #[error(
+        "{model} needs a grid of {points} points ({mebibytes} MiB), and {available} MiB are free here; make the grid coarser with --grid"
+    )]
+    OutOfMemory {
+        /// Name of the model.
+        model: String,
+        /// Points of the grid, all levels and modes together.
+        points: u64,
+        /// Memory they take, MiB.
+        mebibytes: u64,
+        /// Memory that is free, MiB.
+        available: u64,
+    },
     /// An agent no longer had a belief to act on.
     #[error(
         "in episode {episode} the mean of the belief is {LARGEST:e} or more after step {step}: the state, or the filter's numbers, grow without end; let the motion of the model die out, shorten its episodes, or solve again if the policy was edited"

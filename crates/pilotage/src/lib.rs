@@ -34,6 +34,7 @@ pub mod belief;
 mod digest;
 pub mod error;
 mod files;
+mod memory;
 pub mod model;
 pub mod observe;
 pub mod parallel;

@@ -219,10 +219,16 @@ fn levels_that_were_cut_make_no_look_worth_more_than_it_tells() {
     assert!(earned.assumed.discounted.mean < 4.1065 + 4.0 * earned.assumed.discounted.stderr);
 }
 
+/// What is changed, and parts of what is said.
+type Refused = (
+    &'static [(&'static str, &'static str)],
+    &'static [&'static str],
+);
+
 /// What is refused, by what is changed and a part of what is said.
 #[test]
 fn what_no_plan_sees_is_an_error() {
-    let refused: &[(&[(&str, &str)], &[&str])] = &[
+    let refused: &[Refused] = &[
         (
             &[("in = { x = [6.0, 7.0] }", "in = { x = [60.0, 70.0] }")],
             &["reward 1", "x = [60, 70]", "widen `state.bounds`"],

@@ -66,6 +66,16 @@ impl Clusters {
         best.0
     }
 
+    fn fits(&self, states: usize) -> bool {
+        let finite = |bounds: &Interval| bounds.width() > 0.0 && bounds.width().is_finite();
+        let place =
+            |centre: &Vec<f64>| centre.len() == states && centre.iter().all(|x| x.is_finite());
+        !self.is_empty()
+            && self.bounds.len() == states
+            && self.bounds.iter().all(finite)
+            && self.centres.iter().all(place)
+    }
+
     /// Squared distance between two clusters, 1 for opposite corners of the world.
     pub fn between(&self, a: ClusterId, b: ClusterId) -> f64 {
         self.distance(&self.centres[a], &self.centres[b])
@@ -127,6 +137,16 @@ impl Recall {
                 .flat_map(|(_, row)| row.iter().map(renumbered))
                 .collect(),
         }
+    }
+
+    /// Whether sizes and numbers are as they have to be.
+    pub(crate) fn fits(&self, states: usize, actions: usize, modes: usize) -> bool {
+        let is_mode = |mode: &ModeId| *mode < modes;
+        self.clusters.fits(states)
+            && self.actions == actions
+            && self.first.len() == self.clusters.len()
+            && self.next.len() == modes * actions * self.clusters.len()
+            && self.first.iter().chain(&self.next).all(is_mode)
     }
 }
 

@@ -34,7 +34,7 @@ pub struct ModelBuilder {
     discount: f64,
     state: Vec<StateVariable>,
     modes: Vec<String>,
-    starts: Vec<(f64, Option<String>, Vec<f64>, Vec<f64>)>,
+    starts: Vec<Start>,
     motion: [Vec<f64>; 3],
     sensor: [Vec<f64>; 2],
     actions: Vec<Action>,
@@ -44,6 +44,15 @@ pub struct ModelBuilder {
     episode: Episode,
     alive: Option<Clause>,
     belief: BeliefSettings,
+}
+
+/// A start as it was given.
+#[derive(Debug, Clone)]
+struct Start {
+    weight: f64,
+    mode: Option<String>,
+    mean: Vec<f64>,
+    covariance: Vec<f64>,
 }
 
 /// What an event does.
@@ -157,9 +166,12 @@ impl ModelBuilder {
         mean: &[f64],
         covariance: &[f64],
     ) -> Self {
-        let mode = mode.map(str::to_owned);
-        self.starts
-            .push((weight, mode, mean.to_vec(), covariance.to_vec()));
+        self.starts.push(Start {
+            weight,
+            mode: mode.map(str::to_owned),
+            mean: mean.to_vec(),
+            covariance: covariance.to_vec(),
+        });
         self
     }
 
@@ -269,13 +281,13 @@ impl ModelBuilder {
         let h = by_columns(&self.sensor[0], n, path("sensor", "H"))?;
         let m = h.nrows();
         let mut starts = Vec::new();
-        for (i, (weight, name, mean, covariance)) in self.starts.iter().enumerate() {
+        for (i, start) in self.starts.iter().enumerate() {
             let path = Path::new("start").index(i);
             starts.push(StartHypothesis {
-                weight: *weight,
-                mode: mode(name, path.clone().key("mode"))?.unwrap_or(0),
-                mean: DVector::from_column_slice(mean),
-                covariance: square(covariance, n, path.key("covariance"))?,
+                weight: start.weight,
+                mode: mode(&start.mode, path.clone().key("mode"))?.unwrap_or(0),
+                mean: DVector::from_column_slice(&start.mean),
+                covariance: square(&start.covariance, n, path.key("covariance"))?,
                 shape: StartShape::Normal,
             });
         }
@@ -373,7 +385,7 @@ fn by_columns(numbers: &[f64], columns: usize, path: Path) -> Result<DMatrix<f64
 }
 
 fn whole(numbers: &[f64], part: usize, path: &Path) -> Result<(), Fault> {
-    if part > 0 && !numbers.is_empty() && numbers.len() % part == 0 {
+    if part > 0 && !numbers.is_empty() && numbers.len().is_multiple_of(part) {
         return Ok(());
     }
     Err(Fault::new(

@@ -55,7 +55,14 @@ impl Model {
             let path = Path::new("event").index(i);
             self.check_condition(&event.actions, event.mode, &event.region, &path)?;
             self.check_mode(event.becomes, path.clone().key("becomes"))?;
-            finite(event.reward, path.key("reward"))?;
+            finite(event.reward, path.clone().key("reward"))?;
+            if event.steps != Steps::ALL && event.becomes.is_some() {
+                return Err(Fault::of_key(
+                    path.key("steps"),
+                    "the mode changes in some steps only, and the agent's filter does not count steps",
+                    "delete `steps`, or `becomes`",
+                ));
+            }
         }
         self.check_cost()?;
         self.check_belief()

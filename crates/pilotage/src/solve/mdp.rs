@@ -14,7 +14,8 @@ use super::grid::{Axis, Grid, Interpolation, Smoother};
 use super::refusals;
 use super::solver::refuse_if;
 use crate::belief::BeliefMdp;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::memory;
 use crate::model::{ActionId, HypothesisBelief, ModeId, Model, Outcome, Then, WallBelief};
 use crate::observe::Observer;
 use crate::parallel;
@@ -83,7 +84,7 @@ impl StateMdp {
     /// Solves the decision process of true states that underlies a belief decision process.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] where the grid does not fit the memory allowed, [`Error::Setting`] for settings out of range.
+    /// [`Error::TooLarge`] and [`Error::OutOfMemory`] where the grid does not fit the memory, [`Error::Setting`] for settings out of range.
     pub fn solve(
         belief_mdp: &BeliefMdp,
         settings: &Settings,
@@ -324,14 +325,7 @@ fn space(belief_mdp: &BeliefMdp, settings: &Settings) -> Result<Space> {
     let total = (points as u64).saturating_pow(n as u32);
     let numbers = total.saturating_mul(tables as u64);
     let mebibytes = numbers.saturating_mul(8) >> 20;
-    if mebibytes > settings.memory {
-        return Err(Error::TooLarge {
-            model: model.name.clone(),
-            points: numbers,
-            mebibytes,
-            limit: settings.memory,
-        });
-    }
+    memory::check(&model.name, numbers, mebibytes, settings.memory)?;
     let axes = (0..n).map(|variable| {
         let bounds = model.state[variable].bounds;
         if model.belief.walls == WallBelief::Clip {

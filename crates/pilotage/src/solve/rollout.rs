@@ -1,11 +1,13 @@
 //! Beliefs a policy meets, sampled from the model.
 
 use crate::belief::{Belief, BeliefMdp, Filter};
+use crate::error::Result;
 use crate::model::ActionId;
 use crate::parallel;
 use crate::policy::Policy;
 use crate::scenario::Scenario;
 use crate::simulate::{Agent, FilterAgent, run_episode};
+use crate::solve::settings::ensure;
 use crate::world::{Draws, ProblemWorld, World};
 
 /// One decision: where it was taken, what was done, and what was sensed on the way there.
@@ -19,7 +21,25 @@ pub struct Decision {
     pub observation: Vec<f64>,
 }
 
-/// Runs `episodes` episodes in the world that the model assumes and returns the decisions of each. The same for any number of threads.
+/// Most episodes that are run.
+const MOST_RUNS: usize = 1_000_000;
+
+/// Most decisions that are kept, of all episodes together.
+const MOST_DECISIONS: usize = 10_000_000;
+
+/// Checks how many episodes are run.
+///
+/// # Errors
+/// [`crate::Error::Setting`] for none, or too many to keep what they meet.
+pub fn check_runs(setting: &'static str, runs: usize) -> Result<()> {
+    let fits = (1..=MOST_RUNS).contains(&runs);
+    ensure(setting, runs, fits, "1 to 1000000")
+}
+
+/// Runs `episodes` episodes, of which [`check_runs`] is content, in the world that the model assumes and returns the decisions of each.
+/// The same for any number of threads.
+///
+/// Episodes that are very long are cut, all at the same step, so that no more than ten million decisions are kept.
 ///
 /// Where the start hypotheses of a belief are tracked, the agent is told which of them is true: one policy serves all of them.
 pub fn decisions(
@@ -30,6 +50,7 @@ pub fn decisions(
     length: usize,
     seed: u64,
 ) -> Vec<Vec<Decision>> {
+    let length = length.min(MOST_DECISIONS / episodes.max(1));
     let model = mdp.model();
     let scenario = Scenario::assumed(model);
     let told: Vec<Filter> = match mdp.starts() {

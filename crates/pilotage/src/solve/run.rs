@@ -1,6 +1,6 @@
 //! One way to run any solver: what it finds is brought into the form asked for here, and nowhere else.
 
-use super::settings::ensure;
+use super::rollout::check_runs;
 use super::solver::{Found, Learner, Plan, Planner, Problem, Request, Solver};
 use super::{Form, Solution, Solved, compile};
 use crate::error::Result;
@@ -37,7 +37,7 @@ pub fn plan(
     request: &Request,
     observer: &dyn Observer,
 ) -> Result<Solution> {
-    ensure("runs", request.runs, request.runs >= 1, "at least 1")?;
+    check_runs("runs", request.runs)?;
     let problem = Problem::new(model, request);
     problem.mdp().levels().check(model)?;
     planner.accepts(model)?;
@@ -101,7 +101,7 @@ pub fn learn(
     observer: &dyn Observer,
 ) -> Result<Solution> {
     let model = &scenario.model;
-    ensure("runs", request.runs, request.runs >= 1, "at least 1")?;
+    check_runs("runs", request.runs)?;
     let problem = Problem::new(model, request);
     problem.mdp().levels().check(model)?;
     learner.accepts(model)?;

@@ -121,3 +121,29 @@ pub fn ensure(
         range,
     })
 }
+
+/// Most of a count, and how that is said. Products of two of them are still numbers.
+pub type Most = (usize, &'static str);
+
+/// Steps and what is counted in them: no run comes to an end of more.
+pub const MANY: Most = (1_000_000_000, "at most 1000000000");
+
+/// What is kept in memory, one by one.
+pub const KEPT: Most = (1_000_000, "at most 1000000");
+
+/// What is kept in pairs.
+pub const PAIRED: Most = (10_000, "at most 10000");
+
+/// Refuses a count that is out of its range.
+///
+/// # Errors
+/// [`Error::Setting`] with the value and the range.
+pub fn ensure_count(setting: &'static str, value: usize, least: usize, most: Most) -> Result<()> {
+    let range = match least {
+        0 => "at least 0",
+        1 => "at least 1",
+        _ => "at least 2",
+    };
+    ensure(setting, value, value >= least, range)?;
+    ensure(setting, value, value <= most.0, most.1)
+}

@@ -123,7 +123,7 @@ pub struct Request {
     pub form: Form,
     /// Seed of every random number.
     pub seed: u64,
-    /// Episodes run to see which beliefs a policy meets, at least 1.
+    /// Episodes run to see which beliefs a policy meets, 1 to a million.
     pub runs: usize,
     /// File in which a learner keeps its state, to go on from there if it is stopped.
     pub checkpoint: Option<PathBuf>,

@@ -12,7 +12,7 @@ use super::world_model::WorldModel;
 use super::{Learned, Learning, Point, merge, world_model};
 use crate::error::Result;
 use crate::observe::Observer;
-use crate::solve::learn::{Course, Experience, Owner, critical, undiscounted};
+use crate::solve::learn::{Course, Experience, Owner, critical, fitting, undiscounted};
 
 /// All that a run has to remember between two pieces of work.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -65,6 +65,10 @@ impl Course for Task<'_> {
         })
     }
 
+    fn check(&self, state: &State) -> std::result::Result<(), String> {
+        fitting(state.fits(self))
+    }
+
     /// An epoch of a policy, and what follows from it where it was the last at a vigilance.
     fn step(&self, state: &mut State, observer: &dyn Observer) -> Result<ControlFlow<()>> {
         if !state.finished {
@@ -103,6 +107,21 @@ impl Course for Task<'_> {
 }
 
 impl State {
+    /// Whether all its numbers are of a task: a checksum only tells what has been changed by chance.
+    fn fits(&self, task: &Task<'_>) -> bool {
+        let actions = task.actions();
+        let point = |point: &Point| point.states.iter().all(|state| state.0 < actions);
+        self.experience.fits(task.mdp.model().state_dim())
+            && self.curve.iter().all(point)
+            && self.tried <= task.settings.vigilances.len()
+            && self.world.fits(task)
+            && self.policy.fits(task, self.world.states.len())
+            && self
+                .best
+                .iter()
+                .all(|best| best.draft.fits(task) && best.world.fits(task))
+    }
+
     fn run_epoch(&mut self, task: &Task<'_>, observer: &dyn Observer) {
         let states = self.world.states.len();
         if self.policy.epochs() == 0 {

@@ -24,6 +24,16 @@ pub(super) struct DraftNode {
 }
 
 impl Draft {
+    /// Whether it is one that a task can have.
+    pub fn fits(&self, task: &Task<'_>) -> bool {
+        let (actions, depth) = (task.actions(), task.settings.depth);
+        let clusters = self.recall.clusters().len();
+        let node =
+            |node: &DraftNode| node.history.fits(clusters, actions, depth) && node.action < actions;
+        let states = task.mdp.model().state_dim();
+        self.recall.fits(states, actions, self.nodes.len()) && self.nodes.iter().all(node)
+    }
+
     /// The same with some nodes put for others: `into` says by node which one, itself if it stays.
     pub fn merged(&self, into: &[ModeId]) -> Self {
         let nodes = self.nodes.iter().enumerate();

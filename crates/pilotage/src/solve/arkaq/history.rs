@@ -35,6 +35,13 @@ impl History {
         }
     }
 
+    /// Whether it is one of so many clusters and actions, and not longer than what is remembered.
+    pub fn fits(&self, clusters: usize, actions: usize, depth: usize) -> bool {
+        let step =
+            |&(action, cluster): &(ActionId, ClusterId)| action < actions && cluster < clusters;
+        self.cluster < clusters && self.past.len() <= depth && self.past.iter().all(step)
+    }
+
     /// In words.
     pub fn name(&self, actions: &[String]) -> String {
         let mut name = format!("cluster {}", self.cluster);

@@ -35,6 +35,18 @@ impl Policy {
         }
     }
 
+    /// Whether it is one that a task can have, of so many states.
+    pub fn fits(&self, task: &Task<'_>, states: usize) -> bool {
+        let (settings, actions) = (&task.settings, task.actions());
+        self.table.fits(states, actions)
+            && self.best.len() == states
+            && self.best.iter().all(|action| *action < actions)
+            && self.visits.len() == states
+            && self.epoch <= settings.epoch_limit
+            && self.calm <= settings.calm
+            && (settings.cold..=settings.hot).contains(&self.temperature)
+    }
+
     /// Whether the best actions no longer change.
     pub fn converged(&self, task: &Task<'_>) -> bool {
         self.calm >= task.settings.calm

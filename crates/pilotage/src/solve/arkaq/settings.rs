@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::solve::learn::Rates;
-use crate::solve::settings::{self, ensure};
+use crate::solve::settings::{self, KEPT, MANY, PAIRED, ensure, ensure_count};
 
 /// Largest [`Settings::depth`].
 const MOST_DEPTH: usize = 16;
@@ -219,19 +219,20 @@ impl settings::Settings for Settings {
             ensure(setting, value, fits, range)?;
         }
         let counts = [
-            ("vigilances", self.vigilances.len()),
-            ("settle", self.settle),
-            ("explore_limit", self.explore_limit),
-            ("state_limit", self.state_limit),
-            ("epoch", self.epoch),
-            ("epoch_per_entry", self.epoch_per_entry),
-            ("epoch_limit", self.epoch_limit),
-            ("calm", self.calm),
+            ("vigilances", self.vigilances.len(), 1, PAIRED),
+            ("scout", self.scout, 0, MANY),
+            ("settle", self.settle, 1, MANY),
+            ("explore_limit", self.explore_limit, 1, MANY),
+            ("state_limit", self.state_limit, 1, PAIRED),
+            ("epoch", self.epoch, 1, MANY),
+            ("epoch_per_entry", self.epoch_per_entry, 1, KEPT),
+            ("epoch_limit", self.epoch_limit, 1, MANY),
+            ("calm", self.calm, 1, MANY),
+            ("trial", self.trial, 2, KEPT),
         ];
-        for (setting, value) in counts {
-            ensure(setting, value, value >= 1, "at least 1")?;
+        for (setting, value, least, most) in counts {
+            ensure_count(setting, value, least, most)?;
         }
-        ensure("depth", self.depth, self.depth <= MOST_DEPTH, "0 to 16")?;
-        ensure("trial", self.trial, self.trial >= 2, "at least 2")
+        ensure("depth", self.depth, self.depth <= MOST_DEPTH, "0 to 16")
     }
 }

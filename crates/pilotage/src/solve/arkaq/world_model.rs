@@ -31,6 +31,19 @@ pub(super) struct WorldModel {
 }
 
 impl WorldModel {
+    /// Whether it is one that a task can have.
+    pub fn fits(&self, task: &Task<'_>) -> bool {
+        let (actions, depth) = (task.actions(), task.settings.depth);
+        let clusters = self.recall.clusters().len();
+        let state = |state: &History| state.fits(clusters, actions, depth);
+        let states = self.states.len();
+        self.recall
+            .fits(task.mdp.model().state_dim(), actions, states)
+            && self.states.iter().all(state)
+            && self.rewarded.len() == clusters
+            && self.founded.len() == clusters
+    }
+
     /// How exploration ended, in a sentence.
     pub fn describe(&self) -> String {
         let (vigilance, clusters) = (self.vigilance, self.recall.clusters().len());

@@ -18,14 +18,14 @@ use crate::belief::{Belief, BeliefMdp, LevelId};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, ModeId};
 use crate::policy::{Automaton, Matching, Policy};
-use crate::solve::rollout::{self, Decision};
+use crate::solve::rollout::{self, Decision, check_runs};
 
 /// Settings of the compiler.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Form of the automaton.
     pub matching: Matching,
-    /// Episodes run to see which beliefs are met, at least 1.
+    /// Episodes run to see which beliefs are met, 1 to a million.
     pub episodes: usize,
     /// Share of the decisions of a level, in `[0, 1)`, that may come out differently.
     pub slack: f64,
@@ -96,13 +96,7 @@ pub fn compile(
     solver: &str,
     settings: &Settings,
 ) -> Result<Automaton> {
-    if settings.episodes == 0 {
-        return Err(Error::Setting {
-            setting: "episodes",
-            value: "0".to_owned(),
-            range: "at least 1",
-        });
-    }
+    check_runs("runs", settings.episodes)?;
     if !(0.0..1.0).contains(&settings.slack) {
         return Err(Error::Setting {
             setting: "slack",

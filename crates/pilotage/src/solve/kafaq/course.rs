@@ -9,7 +9,7 @@ use super::task::{SOLVER, Task};
 use super::{Learned, Learning, printed, tested};
 use crate::error::Result;
 use crate::observe::Observer;
-use crate::solve::learn::{Course, Owner};
+use crate::solve::learn::{Course, Owner, fitting};
 
 /// All that a run has to remember between two pieces of work.
 // There is one at a time, so its size does not matter.
@@ -40,6 +40,15 @@ impl Course for Task<'_> {
         Ok(match self.settings.rules {
             Rules::Tested => State::Tested(tested::State::new(self)),
             Rules::Printed => State::Printed(printed::State::new(self)),
+        })
+    }
+
+    /// Whether all its numbers are of this task: a checksum only tells what has been changed by chance.
+    fn check(&self, state: &State) -> std::result::Result<(), String> {
+        fitting(match (state, self.settings.rules) {
+            (State::Tested(state), Rules::Tested) => state.fits(self),
+            (State::Printed(state), Rules::Printed) => state.fits(self),
+            (State::Tested(_), Rules::Printed) | (State::Printed(_), Rules::Tested) => false,
         })
     }
 

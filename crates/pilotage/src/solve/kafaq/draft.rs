@@ -39,6 +39,30 @@ pub(super) struct Edge {
 }
 
 impl Draft {
+    /// Whether it is one of a task, with this memory.
+    pub fn fits(&self, task: &Task<'_>, memory: &Memory) -> bool {
+        let (memories, actions) = (memory.len(), task.actions());
+        let node = |node: &DraftNode| {
+            node.level < task.chain.len()
+                && node.memory < memories
+                && task.lattice.holds(&node.cells)
+                && node.action < actions
+        };
+        let edge = |edge: &Edge| {
+            edge.memory < memories
+                && edge.action < actions
+                && task.lattice.holds(&edge.cells)
+                && edge.to < memories
+                && task.coordinates.is_none()
+        };
+        self.memory == *memory
+            && !self.nodes.is_empty()
+            && self.nodes.iter().all(node)
+            && self.edges.iter().all(edge)
+            && self.alias.len() == memories
+            && self.alias.iter().all(|alias| *alias < memories)
+    }
+
     /// Whether a memory has a node at the steady level.
     pub fn has_nodes(&self, memory: usize) -> bool {
         self.nodes.iter().any(|node| node.memory == memory)

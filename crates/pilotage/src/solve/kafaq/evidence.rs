@@ -79,6 +79,15 @@ impl Evidence {
         }
     }
 
+    fn fits(&self, cells: usize, actions: usize) -> bool {
+        let counted = |count: f64| count >= 0.0;
+        self.actions == actions
+            && self.targets.len() == cells * actions
+            && self.visits.len() == cells
+            && self.targets.iter().all(|sample| counted(sample.count))
+            && self.visits.iter().copied().all(counted)
+    }
+
     fn add(&mut self, cell: usize, action: ActionId, target: f64) {
         let sample = &mut self.targets[cell * self.actions + action];
         sample.count += 1.0;
@@ -157,6 +166,14 @@ impl Halves {
             all: none.clone(),
             half: [none.clone(), none],
         }
+    }
+
+    /// Whether it is evidence of so many cells and actions.
+    pub fn fits(&self, cells: usize, actions: usize) -> bool {
+        let [first, second] = &self.half;
+        [&self.all, first, second]
+            .iter()
+            .all(|evidence| evidence.fits(cells, actions))
     }
 
     pub fn add(&mut self, coin: bool, cell: usize, action: ActionId, target: f64) {

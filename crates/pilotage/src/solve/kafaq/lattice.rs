@@ -32,6 +32,15 @@ pub(super) fn cells_needed(bounds: &[Interval], side: &[f64]) -> f64 {
     along.product()
 }
 
+/// Number of boxes of cells of a lattice with sides of at most `side`, without making it.
+pub(super) fn boxes_needed(bounds: &[Interval], side: &[f64]) -> f64 {
+    let along = bounds.iter().zip(side).map(|side| {
+        let count = cells_needed(std::slice::from_ref(side.0), std::slice::from_ref(side.1));
+        0.5 * count * (count + 1.0)
+    });
+    along.product()
+}
+
 impl Lattice {
     /// Cells of at most the given sides over finite bounds.
     pub fn new(bounds: &[Interval], side: &[f64]) -> Self {
@@ -122,6 +131,13 @@ impl Lattice {
                 index
             })
             .collect()
+    }
+
+    /// Whether it is a box of cells of this lattice.
+    pub fn holds(&self, cells: &CellBox) -> bool {
+        let n = self.counts.len();
+        let side = |i: usize| cells.low[i] <= cells.high[i] && cells.high[i] < self.counts[i];
+        cells.low.len() == n && cells.high.len() == n && (0..n).all(side)
     }
 
     /// The cells of a box.

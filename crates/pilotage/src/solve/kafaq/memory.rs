@@ -8,6 +8,9 @@ use crate::model::ActionId;
 /// Places that hold less than this share of the events are strays.
 const STRAY: f64 = 0.01;
 
+/// More places than can each hold that share.
+const MOST_PLACES: usize = 100;
+
 /// What is remembered. Memory 0 is that of the start.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
@@ -50,6 +53,20 @@ impl Memory {
             threshold,
             unit,
         }
+    }
+
+    /// Whether it is one that so many state variables and actions can have.
+    pub fn fits(&self, states: usize, actions: usize) -> bool {
+        let events = match self.kind {
+            Kind::None => return true,
+            Kind::Place => true,
+            Kind::PlaceAndParity(action) => action < actions,
+        };
+        events
+            && (1..=MOST_PLACES).contains(&self.places.len())
+            && self.places.iter().all(|place| place.len() == states)
+            && self.unit.len() == states
+            && self.unit.iter().all(|unit| *unit > 0.0)
     }
 
     /// Number of memories.

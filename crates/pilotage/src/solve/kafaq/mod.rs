@@ -98,6 +98,14 @@ pub struct RegionValue {
     pub value: f64,
 }
 
+impl RegionValue {
+    /// Whether it is one of so many coordinates and actions.
+    fn fits(&self, axes: usize, actions: usize) -> bool {
+        let sides = [&self.lower, &self.upper];
+        sides.iter().all(|side| side.len() == axes) && self.action < actions
+    }
+}
+
 /// The learner with its task: `model` tells it no more than the agent knows of itself, and it acts in the worlds that `worlds` makes.
 ///
 /// # Errors

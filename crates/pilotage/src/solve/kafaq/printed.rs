@@ -44,6 +44,23 @@ impl Region {
         }
     }
 
+    fn fits(&self, states: usize, actions: usize) -> bool {
+        let Place::Segment {
+            lower,
+            minimum,
+            upper,
+        } = &self.place
+        else {
+            return false;
+        };
+        let sides = [lower, minimum, upper];
+        sides.iter().all(|side| side.len() == states)
+            && (0..states).all(|i| lower[i] <= minimum[i] && minimum[i] <= upper[i])
+            && self.values.len() == actions
+            && self.visits.len() == actions
+            && self.visits.iter().all(|visits| *visits >= 0.0)
+    }
+
     fn best(&self) -> ActionId {
         let better = |best, action| {
             if self.values[action] > self.values[best] {
@@ -89,6 +106,23 @@ impl State {
             calm: 0,
             reward: 0.0,
         }
+    }
+
+    /// Whether it is one that a task can have.
+    pub fn fits(&self, task: &Task<'_>) -> bool {
+        let settings = &task.settings;
+        let (states, actions) = (task.mdp.model().state_dim(), task.actions());
+        let point = |point: &Point| {
+            point.memory == 0 && point.regions.iter().all(|r| r.fits(states, actions))
+        };
+        self.experience.fits(states)
+            && !self.regions.is_empty()
+            && self
+                .regions
+                .iter()
+                .all(|region| region.fits(states, actions))
+            && (settings.cold..=settings.hot).contains(&self.temperature)
+            && self.curve.iter().all(point)
     }
 
     fn is_over(&self, task: &Task<'_>) -> bool {

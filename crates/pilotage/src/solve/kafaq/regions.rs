@@ -18,6 +18,13 @@ pub(super) struct Region {
     pub action: ActionId,
 }
 
+impl Region {
+    /// Whether it is one of this lattice and so many actions.
+    pub fn fits(&self, lattice: &Lattice, actions: usize) -> bool {
+        lattice.holds(&self.cells) && self.action < actions
+    }
+}
+
 /// The action that regions give every cell (FindCurrentSegment): that of the smallest box, or else of the nearest.
 pub(super) fn actions_by_cell(lattice: &Lattice, regions: &[Region]) -> Vec<ActionId> {
     let mut order: Vec<&Region> = regions.iter().collect();

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::solve::learn::Rates;
-use crate::solve::settings::{self, ensure};
+use crate::solve::settings::{self, KEPT, MANY, PAIRED, ensure, ensure_count};
 
 /// How regions change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -268,28 +268,20 @@ impl settings::Settings for Settings {
             )?;
         }
         let counts = [
-            ("cell_limit", self.cell_limit, 1),
-            ("cells_along", self.cells_along, 1),
-            ("epoch", self.epoch, 1),
-            ("epoch_per_cell", self.epoch_per_cell, 1),
-            ("epoch_limit", self.epoch_limit, 1),
-            ("calm", self.calm, 1),
-            ("window", self.window, 1),
-            ("odds", self.odds.len(), 1),
-            ("trial", self.trial, 2),
-            (
-                "printed_limit",
-                self.printed_limit.0.min(self.printed_limit.1),
-                1,
-            ),
+            ("cell_limit", self.cell_limit, 1, KEPT),
+            ("cells_along", self.cells_along, 1, KEPT),
+            ("epoch", self.epoch, 1, MANY),
+            ("epoch_per_cell", self.epoch_per_cell, 1, KEPT),
+            ("epoch_limit", self.epoch_limit, 1, MANY),
+            ("calm", self.calm, 1, MANY),
+            ("window", self.window, 1, KEPT),
+            ("odds", self.odds.len(), 1, PAIRED),
+            ("trial", self.trial, 2, KEPT),
+            ("printed_limit", self.printed_limit.0, 1, MANY),
+            ("printed_limit", self.printed_limit.1, 1, PAIRED),
         ];
-        for (setting, value, least) in counts {
-            let range = if least == 1 {
-                "at least 1"
-            } else {
-                "at least 2"
-            };
-            ensure(setting, value, value >= least, range)?;
+        for (setting, value, least, most) in counts {
+            ensure_count(setting, value, least, most)?;
         }
         Ok(())
     }

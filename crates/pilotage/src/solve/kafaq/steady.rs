@@ -57,6 +57,18 @@ impl Crossings {
         }
     }
 
+    fn fits(&self, memories: usize, actions: usize, cells: usize) -> bool {
+        let key = |event: &Crossing| (event.memory, event.action, event.to);
+        let event = |event: &Crossing| {
+            let (memory, action, to) = key(event);
+            memory < memories && to < memories && action < actions && event.counts.len() == cells
+        };
+        (self.actions, self.cells) == (actions, cells)
+            && self.arrivals.len() == memories * actions * cells
+            && self.events.iter().all(event)
+            && self.events.is_sorted_by(|a, b| key(a) < key(b))
+    }
+
     fn place(&self, memory: usize, action: usize, cell: usize) -> usize {
         (memory * self.actions + action) * self.cells + cell
     }
@@ -119,6 +131,31 @@ impl Steady {
             temperature: task.settings.hot,
             memory,
         }
+    }
+
+    /// Whether it is what can have been learned of a task.
+    pub fn fits(&self, task: &Task<'_>) -> bool {
+        let (settings, cells, actions) = (&task.settings, task.lattice.len(), task.actions());
+        if !self.memory.fits(task.mdp.model().state_dim(), actions) {
+            return false;
+        }
+        let memories = self.memory.len();
+        let regions = |regions: &Vec<Region>| {
+            let fits = |region: &Region| region.fits(&task.lattice, actions);
+            !regions.is_empty() && regions.iter().all(fits)
+        };
+        self.table.fits(memories * cells, actions)
+            && self.evidence.len() == memories
+            && self
+                .evidence
+                .iter()
+                .all(|evidence| evidence.fits(cells, actions))
+            && self.regions.len() == memories
+            && self.regions.iter().all(regions)
+            && self.crossings.fits(memories, actions, cells)
+            && self.epoch <= settings.epoch_limit
+            && self.calm <= settings.calm
+            && (settings.cold..=settings.hot).contains(&self.temperature)
     }
 
     /// Whether the regions no longer change.

@@ -1,7 +1,7 @@
 //! What a learner has: its own motion and sensor noise, its body's bounds, and a world to act in.
 
 use super::axes::{axes, extents};
-use super::lattice::{Lattice, cells_needed};
+use super::lattice::{Lattice, boxes_needed, cells_needed};
 use super::settings::Settings;
 use crate::belief::{BeliefMdp, Filter, LevelId};
 use crate::error::{Error, Result};
@@ -12,6 +12,9 @@ use crate::solve::learn::{Actor, Trial, Worlds, known, run_trial};
 
 /// Name of the solver in errors and policies.
 pub(super) const SOLVER: &str = "kafaq";
+
+/// Most boxes of neighbourhoods: all of them are kept.
+const MOST_BOXES: f64 = 1e7;
 
 /// The learner's task.
 pub struct Task<'a> {
@@ -73,6 +76,12 @@ impl<'a> Task<'a> {
             return Err(refuse(format!(
                 "its bounds hold {cells:e} neighbourhoods of {} standard deviations, more than the {} allowed; set the learner's `cell` or `cell_limit` higher",
                 settings.cell, settings.cell_limit
+            )));
+        }
+        let boxes = boxes_needed(&bounds, &side);
+        if boxes > MOST_BOXES {
+            return Err(refuse(format!(
+                "its neighbourhoods form {boxes:e} regions, more than the {MOST_BOXES:e} that can be looked at; set the learner's `cells_along` lower"
             )));
         }
         Ok(Self {

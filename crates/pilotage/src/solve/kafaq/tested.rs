@@ -45,6 +45,25 @@ impl State {
         }
     }
 
+    /// Whether it is one that a task can have.
+    pub fn fits(&self, task: &Task<'_>) -> bool {
+        let (axes, actions) = (task.lattice.whole().low.len(), task.actions());
+        // With every action at most one memory is tried, and two besides.
+        let most_tried = actions + 2;
+        let point = |point: &Point| {
+            point.memory <= self.tried && point.regions.iter().all(|r| r.fits(axes, actions))
+        };
+        self.experience.fits(task.mdp.model().state_dim())
+            && self.tried <= most_tried
+            && self.curve.iter().all(point)
+            && self.learning.iter().all(|steady| steady.fits(task))
+            && self.best.iter().all(|best| {
+                best.memory <= self.tried
+                    && best.steady.fits(task)
+                    && best.draft.fits(task, &best.steady.memory)
+            })
+    }
+
     /// An epoch, and what follows from it where it was the last of a memory.
     pub fn advance(&mut self, task: &Task<'_>, observer: &dyn Observer) -> ControlFlow<()> {
         if let Some(steady) = self.learning.take() {

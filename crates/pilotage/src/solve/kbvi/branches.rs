@@ -241,7 +241,9 @@ impl<'a> Search<'a> {
     ) -> f64 {
         let mut at = from.clone();
         let mut collected = self.weights[time] * reward;
-        let end = (time + self.settings.group).min(self.settings.horizon + 1);
+        let end = time
+            .saturating_add(self.settings.group)
+            .min(self.settings.horizon + 1);
         for t in time..end {
             if t > time {
                 collected += self.weights[t] * self.reward(&at, action);

@@ -13,7 +13,24 @@ use crate::policy::{Automaton, Matching, Policy, first_best};
 use crate::scenario::Scenario;
 use crate::simulate::{FilterAgent, run_episode};
 use crate::solve::compile::annotate;
+use crate::solve::rollout::check_runs;
+use crate::solve::settings::ensure;
 use crate::world::{Draws, ProblemWorld};
+
+/// Most steps that are looked ahead: the search is as deep.
+const MOST_HORIZON: usize = 1000;
+
+/// Checks the first and the last horizon tried.
+///
+/// # Errors
+/// [`Error::Setting`] for one that is too far, and for a last one before the first.
+pub(super) fn check_horizons(first: usize, last: usize) -> Result<()> {
+    for (setting, horizon) in [("first_horizon", first), ("last_horizon", last)] {
+        ensure(setting, horizon, horizon <= MOST_HORIZON, "at most 1000")?;
+    }
+    let range = "at least the first horizon";
+    ensure("last_horizon", last, last >= first, range)
+}
 
 /// Settings of policy generation.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,11 +39,11 @@ pub struct Settings {
     pub matching: Matching,
     /// The search at each belief; its horizon is the first one tried.
     pub search: super::branches::Settings,
-    /// Last horizon tried, at least the first.
+    /// Last horizon tried, at least the first, at most 1000.
     pub last_horizon: usize,
     /// Horizons over which the number of nodes must not change, at least 1.
     pub repeats: usize,
-    /// Runs of the agent for each horizon, at least 1. (Figure 5.8 makes one.)
+    /// Runs of the agent for each horizon, 1 to a million. (Figure 5.8 makes one.)
     pub runs: usize,
     /// Whether the agent looks less far ahead with every step, as in Figure 5.8, and not always equally far.
     pub decreasing: bool,
@@ -72,16 +89,10 @@ pub fn generate(
     observer: &dyn Observer,
 ) -> Result<Generated> {
     let first = settings.search.horizon;
-    if settings.last_horizon < first {
-        return Err(Error::Setting {
-            setting: "last_horizon",
-            value: settings.last_horizon.to_string(),
-            range: "at least the first horizon",
-        });
-    }
+    check_horizons(first, settings.last_horizon)?;
+    check_runs("runs", settings.runs)?;
     for (setting, value) in [
         ("repeats", settings.repeats),
-        ("runs", settings.runs),
         ("group", settings.search.group),
     ] {
         if value == 0 {

@@ -8,6 +8,7 @@ pub mod generate;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::rollout::check_runs;
 use super::settings::{Settings, ensure};
 use super::solver::{Found, Plan, Planner, Problem, refuse_if};
 use super::{Form, refusals};
@@ -23,15 +24,15 @@ const SOLVER: &str = "kbvi";
 /// The planner of open-loop branches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Kbvi {
-    /// First horizon tried, in steps; at least 0.
+    /// First horizon tried, in steps; at most 1000.
     pub first_horizon: usize,
-    /// Last horizon tried; at least the first.
+    /// Last horizon tried; at least the first, at most 1000.
     pub last_horizon: usize,
     /// Horizons over which the number of nodes must not change; at least 1.
     pub repeats: usize,
     /// Steps for which an action is kept once chosen; at least 1.
     pub group: usize,
-    /// Runs of the agent for each horizon; at least 1. (Figure 5.8 makes one.)
+    /// Runs of the agent for each horizon; 1 to a million. (Figure 5.8 makes one.)
     pub runs: usize,
     /// Whether it looks less far ahead with every step of an episode, as in Figure 5.8: `true` or `false`.
     pub decreasing: bool,
@@ -57,17 +58,9 @@ impl Default for Kbvi {
 
 impl Settings for Kbvi {
     fn validate(&self) -> Result<()> {
-        ensure(
-            "last_horizon",
-            self.last_horizon,
-            self.last_horizon >= self.first_horizon,
-            "at least the first horizon",
-        )?;
-        for (setting, value) in [
-            ("repeats", self.repeats),
-            ("group", self.group),
-            ("runs", self.runs),
-        ] {
+        generate::check_horizons(self.first_horizon, self.last_horizon)?;
+        check_runs("runs", self.runs)?;
+        for (setting, value) in [("repeats", self.repeats), ("group", self.group)] {
             ensure(setting, value, value >= 1, "at least 1")?;
         }
         Ok(())

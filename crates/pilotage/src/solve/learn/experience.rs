@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::random::{Rng, Role, stream};
 use crate::world::Draws;
 
+/// More episodes or steps than any run comes to.
+pub const MOST_COUNTED: u64 = 1 << 60;
+
 /// What a learner has met.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Experience {
@@ -17,6 +20,16 @@ pub struct Experience {
 }
 
 impl Experience {
+    /// Whether it is that of a run so far, in a state of so many variables.
+    pub fn fits(&self, states: usize) -> bool {
+        let counted = |count: u64| count <= MOST_COUNTED;
+        counted(self.episodes)
+            && counted(self.samples)
+            && self.rewards.0 <= 0.0
+            && self.rewards.1 >= 0.0
+            && self.events.iter().all(|(_, mean)| mean.len() == states)
+    }
+
     /// Random numbers of the next episode: for the world, and for exploration.
     pub fn next_episode(&mut self, seed: u64) -> (Draws, Rng) {
         let episode = self.episodes;

@@ -11,6 +11,7 @@ mod trial;
 pub(super) use actor::{Actor, known};
 pub use checkpoint::Owner;
 pub(super) use experience::Experience;
+pub(super) use run::fitting;
 pub use run::{Course, Learned, Run, learn};
 pub(super) use table::{Rates, Table, Transition, any_action, boltzmann};
 pub(super) use trial::{Trial, critical, discounted, run_trial, undiscounted};

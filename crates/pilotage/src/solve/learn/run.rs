@@ -49,6 +49,14 @@ pub trait Course {
     fn learned(&self, state: &Self::State) -> Learned<Self::Learning>;
 }
 
+/// Says of a state whose numbers do not fit together or the task that they do not.
+pub(crate) fn fitting(fits: bool) -> std::result::Result<(), String> {
+    match fits {
+        true => Ok(()),
+        false => Err("its numbers do not fit together".to_owned()),
+    }
+}
+
 /// What a learning run found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned<L> {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::experience::MOST_COUNTED;
 use crate::model::ActionId;
 use crate::random::{Rng, uniform};
 
@@ -48,6 +49,14 @@ impl Table {
             visits: vec![0; rows * actions],
             traces: Vec::new(),
         }
+    }
+
+    /// Whether it is a table of so many rows and actions.
+    pub fn fits(&self, rows: usize, actions: usize) -> bool {
+        self.actions == actions
+            && self.values.len() == rows * actions
+            && self.visits.len() == rows * actions
+            && self.visits.iter().all(|visits| *visits <= MOST_COUNTED)
     }
 
     /// Values of the actions in a row.

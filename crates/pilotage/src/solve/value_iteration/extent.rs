@@ -3,6 +3,7 @@
 use super::SOLVER;
 use crate::belief::{BeliefMdp, LevelId};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::model::{Map, Model, Region, WallBelief};
 use crate::solve::grid::{Axis, Settings};
 use crate::solve::walled::WalledSmoother;
@@ -12,7 +13,7 @@ use crate::solve::walled::WalledSmoother;
 ///
 /// # Errors
 /// [`Error::Unsupported`] for too many variables, for rewards or events that lie where the grid does not reach or that are too narrow for
-/// the points asked for; [`Error::TooLarge`] where it does not fit the memory allowed.
+/// the points asked for; [`Error::TooLarge`] and [`Error::OutOfMemory`] where it does not fit the memory.
 pub(super) fn axes(mdp: &BeliefMdp, settings: &Settings) -> Result<Vec<Axis>> {
     let model = mdp.model();
     let n = model.state_dim();
@@ -42,14 +43,8 @@ pub(super) fn axes(mdp: &BeliefMdp, settings: &Settings) -> Result<Vec<Axis>> {
     };
     let total = size(&axes);
     let mebibytes = mebibytes(mdp, total);
-    if mebibytes > settings.memory {
-        return Err(Error::TooLarge {
-            model: model.name.clone(),
-            points: total.saturating_mul(functions(mdp)),
-            mebibytes,
-            limit: settings.memory,
-        });
-    }
+    let all = total.saturating_mul(functions(mdp));
+    memory::check(&model.name, all, mebibytes, settings.memory)?;
     resolves(mdp, &axes)?;
     Ok(axes)
 }

@@ -15,7 +15,7 @@
 //! iterating.
 
 use nalgebra::DMatrix;
-use petgraph::algo::tarjan_scc;
+use petgraph::algo::kosaraju_scc;
 use petgraph::graph::{DiGraph, NodeIndex};
 
 use super::extent::{axes, knows_map, mebibytes};
@@ -54,7 +54,7 @@ pub struct GridPolicy {
 /// Plans by value iteration, for the length of an episode where that matters (see [`super::horizon`]).
 ///
 /// # Errors
-/// [`Error::TooLarge`] where the grid does not fit the memory allowed, [`Error::Setting`] for settings out of range,
+/// [`Error::TooLarge`] and [`Error::OutOfMemory`] where the grid does not fit the memory, [`Error::Setting`] for settings out of range,
 /// [`Error::Unsupported`] where the grid does not see what is paid, [`Error::NotFinite`] where numbers grow beyond all bounds.
 pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> Result<GridPolicy> {
     settings.validate()?;
@@ -116,7 +116,8 @@ fn groups_of_levels(mdp: &BeliefMdp) -> Vec<Vec<LevelId>> {
         group.sort_unstable();
         group
     };
-    let groups = tarjan_scc(&graph).into_iter().map(group);
+    // Not Tarjan's: that one recurses, and levels that lead to each other in a long line would overflow the stack.
+    let groups = kosaraju_scc(&graph).into_iter().map(group);
     groups
         .filter(|group| !group.iter().any(|level| levels.is_over(*level)))
         .collect()

@@ -52,7 +52,7 @@ pub(super) fn plan(
         return Ok(policy);
     }
     match iterate(&BeliefMdp::with_horizon(model, length), settings, observer) {
-        Err(Error::TooLarge { mebibytes, .. }) => {
+        Err(Error::TooLarge { mebibytes, .. } | Error::OutOfMemory { mebibytes, .. }) => {
             policy.remarks.push(format!(
                 "horizon: acts as if an episode of {length} steps had no end, which earns {own:.4} where {best:.4} can be had; \
                  telling the time takes {mebibytes} MiB, more than the {} MiB allowed (memory)",
