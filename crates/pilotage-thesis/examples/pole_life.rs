@@ -41,8 +41,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mdp = BeliefMdp::new(&scenario.model);
 
     let clock = Instant::now();
-    let automaton = policy_search::search(&mdp, &PolicySearch::default(), 1, &Notes)?;
+    let automaton = policy_search::search(&mdp, &PolicySearch::survival(), 1, &Notes)?;
     let planning = clock.elapsed().as_secs_f64();
+    let earning = policy_search::search(&mdp, &PolicySearch::default(), 1, &Notes)?;
     let (lqg, [position, angle, control]) = tuned(&mdp, 1.0)?;
 
     println!(
@@ -72,13 +73,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             life.runs.len()
         );
     };
-    let nodes = automaton.nodes.len().to_string();
-    row(
-        "policy-search, automaton",
-        nodes,
-        &Controller::new(&automaton),
-        options,
-    );
+    for (label, automaton) in [
+        ("policy-search for survival", &automaton),
+        ("policy-search for the return", &earning),
+    ] {
+        let nodes = automaton.nodes.len().to_string();
+        row(label, nodes, &Controller::new(automaton), options);
+    }
     let label = format!("lqg, bang-bang (x {position:e}, angle {angle}, force {control:e})");
     row(&label, String::new(), &lqg, options);
     for (horizon, group) in [(100, 20), (140, 20), (180, 20), (6, 1)] {

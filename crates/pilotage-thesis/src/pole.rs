@@ -26,7 +26,7 @@ pub fn section_5_5_5(context: &Context<'_>) -> Result<Finding> {
         let mdp = BeliefMdp::new(&scenario.model);
         let settings = PolicySearch {
             effort: context.either(1.0, 0.1),
-            ..PolicySearch::default()
+            ..PolicySearch::survival()
         };
         let found = policy_search::search(&mdp, &settings, context.seed, context.observer)?;
         let filter = found.filter.clone();

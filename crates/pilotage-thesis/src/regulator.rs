@@ -34,7 +34,7 @@ fn bang_bang(mdp: &BeliefMdp, [position, angle, control]: PoleWeights) -> Result
 }
 
 /// The controller of a cart and pole (state `x, x', theta, theta'`, two actions) under which the agent's own model expects the
-/// longest life from start to failure: the best of a coarse comparison of all weights, and of a finer one of the eight that did
+/// longest life once it knows where it is: the best of a coarse comparison of all weights, and of a finer one of the eight that did
 /// best. `effort`, above 0, is a factor on the simulations; 1 is thorough.
 ///
 /// # Errors
@@ -48,29 +48,30 @@ pub fn tuned(mdp: &BeliefMdp, effort: f64) -> Result<(Controller, PoleWeights)> 
         });
     }
     // Of failures as rare as with little noise no sample tells; with closer limits there are enough.
-    let steady = mdp.levels().covariance(mdp.levels().len() - 1);
+    let last = mdp.levels().len() - 1;
+    let steady = mdp.levels().covariance(last);
     let limits = if steady[(2, 2)] < QUIET { 0.75 } else { 1.0 };
-    let runs = Runs::from_start(mdp).with_limits(limits);
-    let hazard = |policy: &Controller, count: f64| {
+    let runs = Runs::steady(mdp, last, &[0.0; 4]).with_limits(limits);
+    let failure = |policy: &Controller, count: f64| {
         let sample = Sample {
             runs: (count * effort).ceil() as usize,
             steps: 10_000,
             seed: 7,
         };
-        runs.hazard(policy, sample)
+        runs.failure(policy, sample)
     };
     let mut tried = Vec::new();
     for position in [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 1.0] {
         for control in [1e-6, 1e-5, 1e-4, 1e-3, 1e-2] {
             let weights = [position, 1.0, control];
             let policy = bang_bang(mdp, weights)?;
-            tried.push((hazard(&policy, 50.0), policy, weights));
+            tried.push((failure(&policy, 50.0), policy, weights));
         }
     }
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
     tried.truncate(8);
     for (measured, policy, _) in &mut tried {
-        *measured = hazard(policy, 400.0);
+        *measured = failure(policy, 400.0);
     }
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (_, policy, weights) = tried.swap_remove(0);

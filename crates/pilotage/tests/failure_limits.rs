@@ -148,7 +148,7 @@ fn pole(name: &str, effort: f64) -> (Model, BeliefMdp, PolicySearch) {
     let mdp = BeliefMdp::new(&model);
     let settings = PolicySearch {
         effort,
-        ..Default::default()
+        ..PolicySearch::survival()
     };
     (model, mdp, settings)
 }
@@ -156,7 +156,7 @@ fn pole(name: &str, effort: f64) -> (Model, BeliefMdp, PolicySearch) {
 /// The belief's own probability of failing foretells the mean life in the linear world: 20 runs of 30,000 steps see about 15
 /// failures, whose count is within a factor 2.5 of its expectation with more than 99% probability.
 #[test]
-fn hazard_foretells_life() {
+fn the_probability_of_failing_foretells_life() {
     let (mut model, _, settings) = pole("cart-pole-noisy", 0.02);
     // The believed start is the file's true one. From the one it has there, most poles would have fallen at once, and the belief about
     // the others does not know that they have not.
@@ -175,7 +175,7 @@ fn hazard_foretells_life() {
         steps: 3000,
         seed: 5,
     };
-    let foretold = Runs::from_start(&mdp).hazard(&policy, sample);
+    let foretold = Runs::from_start(&mdp).failure(&policy, sample);
     let options = LifeOptions {
         runs: 20,
         steps: 30_000,

@@ -3,27 +3,44 @@
 //! Beliefs are simulated, not states: at every step the belief itself says how likely the true state is outside the limits. The
 //! average of that over a run is the probability of failing in a step, found with far fewer steps than counting failures takes
 //! (Rao-Blackwell). A run starts afresh with just that probability.
+//!
+//! At the start of an episode the agent may be so uncertain that hardly any state it thinks possible is within the limits, while it is
+//! there to act only because the true one is. A start is then drawn as the agent believes it, from those within the limits, and it is
+//! the belief of an observer who was told it that says how likely the state is outside.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::belief::gaussian::exit_probability;
 use crate::belief::{Belief, BeliefMdp, Filter, LevelId};
-use crate::model::{Interval, Region};
+use crate::model::{Interval, Model, Region, StartHypothesis, StartShape};
 use crate::parallel;
 use crate::policy::Policy;
 use crate::random::{Rng, Role, stream, uniform};
-use crate::world::Noise;
+use crate::scenario::Scenario;
+use crate::world::{Draws, Noise, ProblemWorld, World};
 
-/// Runs of beliefs from one start.
+/// Runs of beliefs from one kind of start.
 #[derive(Debug)]
 pub struct Runs {
-    filter: Filter,
+    /// Keeps the belief that is acted on.
+    agent: Filter,
+    /// Who is told where each run begins; nobody where the agent's own belief is all there is to know.
+    observer: Option<Observer>,
+    /// What the belief that tells of failures is made of: of the observer, or else the agent.
     covariances: Vec<DMatrix<f64>>,
     alive: Region,
     /// `H A` row by row, `H B u` by action, innovation by level and action.
     carried: Vec<f64>,
     pushed: Vec<Vec<f64>>,
     innovations: Vec<Vec<Noise>>,
+}
+
+/// A filter that begins with certainty.
+#[derive(Debug)]
+struct Observer {
+    filter: Filter,
+    /// Starts are drawn here.
+    scenario: Scenario,
 }
 
 /// How many runs, how long, from which seed.
@@ -38,23 +55,39 @@ pub struct Sample {
 }
 
 impl Runs {
-    /// Runs that begin and stay at a level that repeats itself, from the origin.
-    pub fn steady(mdp: &BeliefMdp, level: LevelId) -> Self {
+    /// Runs that begin and stay at a level that repeats itself, from a mean (length `n`).
+    pub fn steady(mdp: &BeliefMdp, level: LevelId, mean: &[f64]) -> Self {
         let start = Belief {
             level,
-            mode: 0,
-            mean: vec![0.0; mdp.model().state_dim()],
+            mode: mdp.start().mode,
+            mean: mean.to_vec(),
         };
-        let filter = Filter::new(mdp.model(), mdp.levels(), &start);
-        Self::new(mdp, filter)
+        Self::new(mdp, mdp.filter_from(&start), None)
     }
 
-    /// Runs that begin as an episode does.
+    /// Runs that begin as an episode does, at a state within the limits that the agent is not told.
     pub fn from_start(mdp: &BeliefMdp) -> Self {
-        Self::new(mdp, mdp.filter())
+        let model = mdp.model();
+        let n = model.state_dim();
+        let certain = StartHypothesis {
+            weight: 1.0,
+            mode: mdp.start().mode,
+            mean: DVector::zeros(n),
+            covariance: DMatrix::zeros(n, n),
+            shape: StartShape::Normal,
+        };
+        let told = BeliefMdp::new(&Model {
+            start: vec![certain],
+            ..model.clone()
+        });
+        let observer = Observer {
+            filter: told.filter(),
+            scenario: Scenario::assumed(model),
+        };
+        Self::new(&told, mdp.filter(), Some(observer))
     }
 
-    fn new(mdp: &BeliefMdp, filter: Filter) -> Self {
+    fn new(mdp: &BeliefMdp, agent: Filter, observer: Option<Observer>) -> Self {
         let (model, levels) = (mdp.model(), mdp.levels());
         let actions = 0..model.actions.len();
         let h = &model.sensor.h;
@@ -63,7 +96,8 @@ impl Runs {
             Noise::new(&step.correction.innovation)
         };
         Self {
-            filter,
+            agent,
+            observer,
             covariances: (0..levels.len())
                 .map(|level| levels.covariance(level).clone())
                 .collect(),
@@ -98,7 +132,7 @@ impl Runs {
         const FACTOR: f64 = 0.95;
         const TIMES: usize = 45;
         for _ in 0..TIMES {
-            if self.hazard(policy, sample) >= least {
+            if self.failure(policy, sample) >= least {
                 break;
             }
             self = self.with_limits(FACTOR);
@@ -106,56 +140,86 @@ impl Runs {
         self
     }
 
-    /// Probability of failing in a step, averaged over the sample. The same for any number of threads.
-    pub fn hazard(&self, policy: &dyn Policy, sample: Sample) -> f64 {
+    /// Probability of failing in a step, averaged over the sample; who fails begins anew. The same for any number of threads.
+    pub fn failure(&self, policy: &dyn Policy, sample: Sample) -> f64 {
         let sums = parallel::map(sample.runs, |run| {
             let mut sum = 0.0;
-            self.run(policy, sample, run, &mut |_, hazard| sum += hazard);
+            self.run(policy, sample, run, &mut |_, failure, fate| {
+                sum += failure;
+                uniform(fate) < failure
+            });
             sum
         });
         sums.iter().sum::<f64>() / (sample.runs * sample.steps) as f64
     }
 
-    /// Standard deviation of the mean of the belief about 0, by variable.
-    pub fn spread(&self, policy: &dyn Policy, sample: Sample) -> Vec<f64> {
-        let n = self.filter.states();
+    /// Probability of failing within a run. The same for any number of threads.
+    pub fn failing(&self, policy: &dyn Policy, sample: Sample) -> f64 {
+        let failed = parallel::map(sample.runs, |run| {
+            let mut alive = 1.0;
+            self.run(policy, sample, run, &mut |_, failure, _| {
+                alive *= 1.0 - failure;
+                false
+            });
+            1.0 - alive
+        });
+        failed.iter().sum::<f64>() / sample.runs as f64
+    }
+
+    /// Standard deviation of the mean of the belief about where it began, by variable.
+    pub fn deviation(&self, policy: &dyn Policy, sample: Sample) -> Vec<f64> {
+        let start = self.agent.initial().mean;
         let sums = parallel::map(sample.runs, |run| {
-            let mut sum = vec![0.0; n];
-            self.run(policy, sample, run, &mut |mean, _| {
-                for (sum, value) in sum.iter_mut().zip(mean) {
-                    *sum += value * value;
+            let mut sum = vec![0.0; start.len()];
+            self.run(policy, sample, run, &mut |mean, failure, fate| {
+                for ((sum, value), start) in sum.iter_mut().zip(mean).zip(&start) {
+                    *sum += (value - start) * (value - start);
                 }
+                uniform(fate) < failure
             });
             sum
         });
         let total = (sample.runs * sample.steps) as f64;
-        (0..n)
+        (0..start.len())
             .map(|i| (sums.iter().map(|sum| sum[i]).sum::<f64>() / total).sqrt())
             .collect()
     }
 
+    /// One run. After every step `visit` is told the mean and the probability of failing in it, and says whether to begin anew.
     fn run(
         &self,
         policy: &dyn Policy,
         sample: Sample,
         run: usize,
-        visit: &mut impl FnMut(&[f64], f64),
+        visit: &mut impl FnMut(&[f64], f64, &mut Rng) -> bool,
     ) {
         let mut sensor = stream(sample.seed, run as u64, Role::Sensor);
         let mut fate = stream(sample.seed, run as u64, Role::World);
-        let mut belief = self.filter.initial();
+        let mut told = self.observer.as_ref().map(|observer| {
+            let draws = Draws::new(sample.seed, run as u64);
+            Told::new(observer, draws)
+        });
+        let mut held = self.agent.initial();
         let mut observation = vec![0.0; self.pushed.first().map_or(0, Vec::len)];
-        let mut scratch = vec![0.0; self.filter.states()];
+        let mut scratch = vec![0.0; self.agent.states()];
         for _ in 0..sample.steps {
-            let action = policy.action(&belief);
-            self.sense(&belief, action, &mut observation, &mut sensor);
-            self.filter
-                .update(&mut belief, action, &observation, &mut scratch);
-            let hazard =
-                exit_probability(&belief.mean, &self.covariances[belief.level], &self.alive);
-            visit(&belief.mean, hazard);
-            if uniform(&mut fate) < hazard {
-                self.filter.reset(&mut belief);
+            let action = policy.action(&held);
+            let knows = told.as_ref().map_or(&held, |told| &told.belief);
+            self.sense(knows, action, &mut observation, &mut sensor);
+            self.agent
+                .update(&mut held, action, &observation, &mut scratch);
+            if let Some(told) = &mut told {
+                let filter = &told.observer.filter;
+                filter.update(&mut told.belief, action, &observation, &mut scratch);
+            }
+            let knows = told.as_ref().map_or(&held, |told| &told.belief);
+            let failure =
+                exit_probability(&knows.mean, &self.covariances[knows.level], &self.alive);
+            if visit(&knows.mean, failure, &mut fate) {
+                self.agent.reset(&mut held);
+                if let Some(told) = &mut told {
+                    told.begin();
+                }
             }
         }
     }
@@ -171,5 +235,32 @@ impl Runs {
             *reading = pushed + row.iter().zip(&from.mean).map(|(a, m)| a * m).sum::<f64>();
         }
         self.innovations[from.level][action].add_to(observation, rng);
+    }
+}
+
+/// An observer during a run.
+struct Told<'a> {
+    observer: &'a Observer,
+    belief: Belief,
+    world: ProblemWorld,
+    draws: Draws,
+}
+
+impl<'a> Told<'a> {
+    fn new(observer: &'a Observer, draws: Draws) -> Self {
+        let mut told = Self {
+            belief: observer.filter.initial(),
+            world: ProblemWorld::new(&observer.scenario),
+            observer,
+            draws,
+        };
+        told.begin();
+        told
+    }
+
+    fn begin(&mut self) {
+        self.observer.filter.reset(&mut self.belief);
+        self.world.reset(&mut self.draws);
+        self.belief.mean.copy_from_slice(self.world.state());
     }
 }
