@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use pilotage::observe::Observer;
+use pilotage::progress::Progress;
 
 use crate::failure::say;
 
@@ -59,7 +59,7 @@ impl Bars {
     }
 }
 
-impl Observer for Bars {
+impl Progress for Bars {
     fn progress(&self, stage: &'static str, done: u64, total: u64) {
         if self.shown != Shown::Nothing
             && let Ok(mut work) = self.work.lock()

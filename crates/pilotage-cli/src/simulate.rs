@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::Args;
 use pilotage::belief::BeliefMdp;
-use pilotage::policy::{Automaton, Controller};
+use pilotage::policy::{Automaton, AutomatonRunner};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::evaluate;
 use pilotage::simulate::wake_up::{Settings, measure};
@@ -56,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let evaluation = evaluate(
         &world,
         &automaton.filter,
-        &Controller::new(&automaton),
+        &AutomatonRunner::new(&automaton),
         arguments.evaluation.options(),
         &bars,
     );
@@ -101,7 +101,7 @@ fn wake_up(
         ..Settings::default()
     };
     let clock = Instant::now();
-    let policy = Controller::new(automaton);
+    let policy = AutomatonRunner::new(automaton);
     let result = measure(&BeliefMdp::new(model), truth, &policy, &settings, bars)?;
     let mut out = std::io::stdout().lock();
     if arguments.json {

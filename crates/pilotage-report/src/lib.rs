@@ -6,7 +6,7 @@
 //! nothing of schemes draw the light one.
 //!
 //! ```
-//! use pilotage::{model, observe::Silent};
+//! use pilotage::{model, progress::Silent};
 //! use pilotage::solve::{Request, ValueIteration, plan};
 //! use pilotage_report::automaton_svg;
 //!

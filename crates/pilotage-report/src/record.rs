@@ -4,10 +4,10 @@ use super::finding::{Frame, Hypothesis, Recording};
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::error::{Error, Result};
 use pilotage::model::{Interval, ModeId, Model, Region};
-use pilotage::policy::{Automaton, Controller};
+use pilotage::policy::{Automaton, AutomatonRunner};
 use pilotage::scenario::{Scenario, Truth, Walls};
 use pilotage::simulate::{Agent, FilterAgent, run_episode, wake_up};
-use pilotage::world::{Draws, ProblemWorld, World};
+use pilotage::world::{ProblemWorld, Streams, World};
 
 /// Which run to write down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,7 +46,7 @@ pub fn record(
             model: model.name.clone(),
         });
     }
-    let controller = Controller::new(automaton);
+    let controller = AutomatonRunner::new(automaton);
     let frames = if mdp.starts().len() > 1 {
         scenario.truth.start = None;
         let wake_up::Settings {
@@ -97,7 +97,7 @@ fn run(
     let model = &scenario.model;
     let mut world = ProblemWorld::new(scenario);
     // The run below draws the same start once more.
-    world.reset(&mut Draws::new(take.seed, take.episode));
+    world.reset(&mut Streams::new(take.seed, take.episode));
     agent.reset();
     let before = |state: &[f64], mode: ModeId, agent: &dyn Agent| {
         let (valid, hypotheses) = believed(mdp, agent);
@@ -116,7 +116,7 @@ fn run(
     run_episode(
         &mut world,
         agent,
-        &mut Draws::new(take.seed, take.episode),
+        &mut Streams::new(take.seed, take.episode),
         &mut vec![0.0; model.observation_dim()],
         (model.episode.length.min(take.most_steps), model.discount),
         &mut |moment, agent| {

@@ -1,13 +1,13 @@
 //! Recorded episodes are the runs that a simulation makes.
 
 use pilotage::belief::BeliefMdp;
-use pilotage::observe::Silent;
-use pilotage::policy::Controller;
+use pilotage::policy::AutomatonRunner;
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario, Truth};
 use pilotage::simulate::{Agent, FilterAgent, run_episode, wake_up};
 use pilotage::solve::value_iteration::Settings;
 use pilotage::solve::{Request, ValueIteration, plan};
-use pilotage::world::{Draws, ProblemWorld};
+use pilotage::world::{ProblemWorld, Streams};
 use pilotage_report::{Recording, Take, record};
 
 const SEED: u64 = 3;
@@ -21,7 +21,7 @@ fn simulated(scenario: &Scenario, agent: &mut dyn Agent, episode: u64) -> Steps 
     run_episode(
         &mut ProblemWorld::new(scenario),
         agent,
-        &mut Draws::new(SEED, episode),
+        &mut Streams::new(SEED, episode),
         &mut vec![0.0; model.observation_dim()],
         (model.episode.length, model.discount),
         &mut |moment, _| {
@@ -56,7 +56,7 @@ fn recordings_are_the_runs_of_a_simulation() {
         let solution = plan(&planner, &scenario.model, &Request::default(), &Silent)
             .expect("a model it accepts");
         let automaton = solution.automaton().expect("the default form");
-        let controller = Controller::new(automaton);
+        let controller = AutomatonRunner::new(automaton);
         for episode in 0..5 {
             let whole = if name == "u-maze" {
                 let defaults = wake_up::Settings::default();

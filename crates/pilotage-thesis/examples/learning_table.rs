@@ -11,8 +11,8 @@
 
 use std::time::Instant;
 
-use pilotage::observe::Silent;
-use pilotage::policy::{Automaton, Controller};
+use pilotage::policy::{Automaton, AutomatonRunner};
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options, evaluate};
 use pilotage::solve::value_iteration;
@@ -319,7 +319,7 @@ fn run_arkaq(
 }
 
 fn earned(scenario: &Scenario, automaton: &Automaton) -> Evaluation {
-    let controller = Controller::new(automaton);
+    let controller = AutomatonRunner::new(automaton);
     evaluate(
         scenario,
         &automaton.filter,

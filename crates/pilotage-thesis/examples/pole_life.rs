@@ -12,8 +12,8 @@
 use std::time::Instant;
 
 use pilotage::belief::BeliefMdp;
-use pilotage::observe::{Observer, Silent};
-use pilotage::policy::{Controller, Policy};
+use pilotage::policy::{AutomatonRunner, Policy};
+use pilotage::progress::{Progress, Silent};
 use pilotage::scenario::find;
 use pilotage::simulate::{LifeOptions, life};
 use pilotage::solve::kbvi::branches::{self, Branches};
@@ -22,7 +22,7 @@ use pilotage_thesis::regulator::tuned;
 
 struct Notes;
 
-impl Observer for Notes {
+impl Progress for Notes {
     fn note(&self, message: &str) {
         eprintln!("{message}");
     }
@@ -78,7 +78,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("policy-search for the return", &earning),
     ] {
         let nodes = automaton.nodes.len().to_string();
-        row(label, nodes, &Controller::new(automaton), options);
+        row(label, nodes, &AutomatonRunner::new(automaton), options);
     }
     let label = format!("lqg, bang-bang (x {position:e}, angle {angle}, force {control:e})");
     row(&label, String::new(), &lqg, options);

@@ -1,7 +1,7 @@
 //! Every planner on the problems of one and two dimensions, as Markdown tables: `cargo run --release -p pilotage-thesis --example results > docs/results.md`.
 #![allow(clippy::print_stdout)]
 
-use pilotage::observe::Silent;
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options};
 use pilotage::solve::kbvi::formulas::{Formulas, IntegralFormula, RewardFormula, SpreadFormula};

@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use pilotage::belief::{Belief, BeliefMdp, Filter};
 use pilotage::error::Result;
 use pilotage::model::{ActionId, Region};
-use pilotage::observe::Observer;
 use pilotage::policy::Policy;
+use pilotage::progress::Progress;
 use pilotage::scenario::Scenario;
 use pilotage::simulate::{Agent, Estimate, Evaluation, Options, evaluate, run_episode};
 use pilotage::solve::value_iteration;
-use pilotage::world::{Draws, ProblemWorld};
+use pilotage::world::{ProblemWorld, Streams};
 
 /// What somebody earns who knows more than the learner, or does less.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +34,7 @@ pub fn baselines(
     scenario: &Scenario,
     planner: &value_iteration::Settings,
     options: Options,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<Vec<Baseline>> {
     let told = told(scenario);
     let plan =
@@ -153,7 +153,7 @@ fn mode_seen(scenario: &Scenario, policy: &dyn Policy, options: Options) -> Eval
     let mut observation = vec![0.0; model.observation_dim()];
     let episodes: Vec<_> = (0..options.episodes)
         .map(|episode| {
-            let mut draws = Draws::new(options.seed, episode as u64);
+            let mut draws = Streams::new(options.seed, episode as u64);
             run_episode(
                 &mut world,
                 &mut seer,
@@ -175,7 +175,7 @@ fn mode_seen(scenario: &Scenario, policy: &dyn Policy, options: Options) -> Eval
 }
 
 /// The best of all 1024 maps from ten cells of the line to two actions.
-fn best_memoryless(scenario: &Scenario, options: Options, observer: &dyn Observer) -> Evaluation {
+fn best_memoryless(scenario: &Scenario, options: Options, observer: &dyn Progress) -> Evaluation {
     const MAPS: usize = 1 << 10;
     struct Map(usize);
     impl Policy for Map {

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use pilotage::belief::BeliefMdp;
-use pilotage::observe::Silent;
-use pilotage::policy::Controller;
+use pilotage::policy::AutomatonRunner;
+use pilotage::progress::Silent;
 use pilotage::scenario::{Scenario, Simulator};
 use pilotage::simulate::{Evaluation, LifeOptions, life};
 use pilotage::solve::arkaq::{self, Learned};
@@ -400,7 +400,7 @@ pub fn section_3_4_8(context: &Context<'_>) -> Result<Finding> {
                     steps,
                     seed: context.seed + 998 + seed,
                 };
-                let policy = Controller::new(&learned.automaton);
+                let policy = AutomatonRunner::new(&learned.automaton);
                 let lived = life(
                     &scenario,
                     &learned.automaton.filter,

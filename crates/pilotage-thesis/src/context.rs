@@ -2,8 +2,8 @@
 
 use pilotage::belief::BeliefMdp;
 use pilotage::model::Model;
-use pilotage::observe::Observer;
 use pilotage::policy::Automaton;
+use pilotage::progress::Progress;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options};
 use pilotage::solve::{Planner, Request, Solution, ValueIteration, plan};
@@ -20,7 +20,7 @@ pub struct Context<'a> {
     /// Fewer episodes and seeds, for a look and for CI.
     pub quick: bool,
     /// Is told how far it has come.
-    pub observer: &'a dyn Observer,
+    pub observer: &'a dyn Progress,
 }
 
 impl Context<'_> {

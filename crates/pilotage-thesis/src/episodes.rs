@@ -1,8 +1,8 @@
 //! The episodes that open the report.
 
 use pilotage::belief::BeliefMdp;
-use pilotage::observe::Observer;
 use pilotage::policy::{Automaton, Matching};
+use pilotage::progress::Progress;
 use pilotage::scenario;
 use pilotage::solve::{Request, ValueIteration, plan};
 use pilotage_report::{Recording, Take, record};
@@ -14,7 +14,7 @@ use crate::error::Result;
 ///
 /// # Errors
 /// None that a user could cause: those of solving the built-in models.
-pub fn episodes(seed: u64, observer: &dyn Observer) -> Result<Vec<Recording>> {
+pub fn episodes(seed: u64, observer: &dyn Progress) -> Result<Vec<Recording>> {
     let shown = [
         (
             "corridor",

@@ -1,8 +1,8 @@
 //! Chapters 3, 4 and 6: what the learners find, over many seeds, beside planners that are told map and rewards.
 
 use pilotage::belief::BeliefMdp;
-use pilotage::observe::Silent;
-use pilotage::policy::{Automaton, Controller};
+use pilotage::policy::{Automaton, AutomatonRunner};
+use pilotage::progress::Silent;
 use pilotage::scenario::Scenario;
 use pilotage::simulate::{Evaluation, LifeOptions, Options, evaluate, life};
 use pilotage::solve::compile;
@@ -91,7 +91,7 @@ pub fn earned(world: &Scenario, automaton: &Automaton, options: Options) -> Eval
     evaluate(
         world,
         &automaton.filter,
-        &Controller::new(automaton),
+        &AutomatonRunner::new(automaton),
         options,
         &Silent,
     )
@@ -293,7 +293,7 @@ pub fn section_4_3_6(context: &Context<'_>) -> Result<Finding> {
                 steps,
                 seed: context.seed + 998 + seed,
             };
-            let policy = Controller::new(&learned.automaton);
+            let policy = AutomatonRunner::new(&learned.automaton);
             let lived = life(
                 &scenario,
                 &learned.automaton.filter,

@@ -6,7 +6,7 @@
 //! [`episodes`] that open the report.
 //!
 //! ```
-//! use pilotage::observe::Silent;
+//! use pilotage::progress::Silent;
 //! use pilotage_report::Verdict;
 //! use pilotage_thesis::{Context, EXPERIMENTS};
 //!

@@ -1,7 +1,7 @@
 //! Section 5.5.5: the inverted pendulum, planned.
 
 use pilotage::belief::BeliefMdp;
-use pilotage::policy::{Controller, Policy};
+use pilotage::policy::{AutomatonRunner, Policy};
 use pilotage::simulate::{LifeOptions, life};
 use pilotage::solve::kbvi::branches::{self, Branches};
 use pilotage::solve::{PolicySearch, policy_search};
@@ -39,7 +39,11 @@ pub fn section_5_5_5(context: &Context<'_>) -> Result<Finding> {
             };
             Branches::new(mdp.clone(), settings)
         };
-        let (planned, long, short) = (Controller::new(&found), open_loop(180, 20), open_loop(6, 1));
+        let (planned, long, short) = (
+            AutomatonRunner::new(&found),
+            open_loop(180, 20),
+            open_loop(6, 1),
+        );
         let policies: [(&str, &dyn Policy, u64); 4] = [
             ("policy-search, automaton", &planned, steps),
             ("lqg, bang-bang, its weights tuned", &regulator, steps),

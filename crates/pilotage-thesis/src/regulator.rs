@@ -3,7 +3,7 @@
 use pilotage::belief::BeliefMdp;
 use pilotage::error::{Error, Result};
 use pilotage::model::Model;
-use pilotage::policy::Controller;
+use pilotage::policy::AutomatonRunner;
 use pilotage::solve::lqg::{NearestAction, Weights};
 use pilotage::solve::policy_search::failure::{Runs, Sample};
 
@@ -14,7 +14,7 @@ pub type PoleWeights = [f64; 3];
 const QUIET: f64 = 5e-4;
 
 /// Full force in the direction of the linear-quadratic-Gaussian controller's command, undiscounted.
-fn bang_bang(mdp: &BeliefMdp, [position, angle, control]: PoleWeights) -> Result<Controller> {
+fn bang_bang(mdp: &BeliefMdp, [position, angle, control]: PoleWeights) -> Result<AutomatonRunner> {
     let weights = Weights {
         state: Some(vec![position, 0.0, angle, 0.0]),
         control: Some(vec![control]),
@@ -30,7 +30,7 @@ fn bang_bang(mdp: &BeliefMdp, [position, angle, control]: PoleWeights) -> Result
         reason: "a push to either side is needed, two actions; use a model of the cart and pole"
             .to_owned(),
     })?;
-    Ok(Controller::new(&automaton))
+    Ok(AutomatonRunner::new(&automaton))
 }
 
 /// The controller of a cart and pole (state `x, x', theta, theta'`, two actions) under which the agent's own model expects the
@@ -39,7 +39,7 @@ fn bang_bang(mdp: &BeliefMdp, [position, angle, control]: PoleWeights) -> Result
 ///
 /// # Errors
 /// [`Error::Unsupported`] for a model that is no cart and pole, and as [`NearestAction::new`].
-pub fn tuned(mdp: &BeliefMdp, effort: f64) -> Result<(Controller, PoleWeights)> {
+pub fn tuned(mdp: &BeliefMdp, effort: f64) -> Result<(AutomatonRunner, PoleWeights)> {
     if mdp.model().state_dim() != 4 {
         return Err(Error::Unsupported {
             solver: "lqg",
@@ -52,7 +52,7 @@ pub fn tuned(mdp: &BeliefMdp, effort: f64) -> Result<(Controller, PoleWeights)> 
     let steady = mdp.levels().covariance(last);
     let limits = if steady[(2, 2)] < QUIET { 0.75 } else { 1.0 };
     let runs = Runs::steady(mdp, last, &[0.0; 4]).with_limits(limits);
-    let failure = |policy: &Controller, count: f64| {
+    let failure = |policy: &AutomatonRunner, count: f64| {
         let sample = Sample {
             runs: (count * effort).ceil() as usize,
             steps: 10_000,

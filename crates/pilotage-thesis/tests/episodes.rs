@@ -1,6 +1,6 @@
 //! The episodes that open the report. That a recording is sound, and the run of a simulation, is tested where recordings are made.
 
-use pilotage::observe::Silent;
+use pilotage::progress::Silent;
 use pilotage_thesis::episodes;
 
 #[test]

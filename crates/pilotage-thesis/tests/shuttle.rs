@@ -1,8 +1,8 @@
 //! ARKAQ on the shuttle, beside one who is told which way it faces.
 #![allow(clippy::unwrap_used)]
 
-use pilotage::observe::Silent;
-use pilotage::policy::Controller;
+use pilotage::policy::AutomatonRunner;
+use pilotage::progress::Silent;
 use pilotage::scenario;
 use pilotage::simulate::{Options, evaluate};
 use pilotage::solve::arkaq::{self, Learned, Settings};
@@ -31,7 +31,7 @@ fn a_longer_memory_finds_which_way_the_shuttle_faces_and_merges_into_a_handful_o
     let share = |learned: &Learned| {
         let (filter, policy) = (
             &learned.automaton.filter,
-            Controller::new(&learned.automaton),
+            AutomatonRunner::new(&learned.automaton),
         );
         let earned = evaluate(&scenario, filter, &policy, options(500), &Silent);
         earned.discounted.mean / best.discounted.mean

@@ -3,8 +3,8 @@
 
 use divan::{Bencher, counter::ItemsCount};
 use pilotage::belief::BeliefMdp;
-use pilotage::observe::Silent;
-use pilotage::policy::{Automaton, Controller, Policy};
+use pilotage::policy::{Automaton, AutomatonRunner, Policy};
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::compile::{self, compile};
@@ -21,7 +21,7 @@ const EPISODES: usize = 10_000;
 fn whole() -> Evaluation {
     let corridor = read();
     let policy = plan(&BeliefMdp::new(&corridor.model));
-    simulate(&corridor, &Controller::new(&compiled(&policy)))
+    simulate(&corridor, &AutomatonRunner::new(&compiled(&policy)))
 }
 
 #[divan::bench]
@@ -46,7 +46,7 @@ fn compile_only(bencher: Bencher) {
 fn episodes_of_the_automaton(bencher: Bencher) {
     let corridor = read();
     let policy = plan(&BeliefMdp::new(&corridor.model));
-    let controller = Controller::new(&compiled(&policy));
+    let controller = AutomatonRunner::new(&compiled(&policy));
     bencher
         .counter(ItemsCount::new(EPISODES))
         .bench(|| simulate(&corridor, &controller));

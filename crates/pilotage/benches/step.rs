@@ -5,8 +5,8 @@
 use divan::{Bencher, black_box};
 use nalgebra::{DMatrix, DVector};
 use pilotage::belief::BeliefMdp;
-use pilotage::observe::Silent;
-use pilotage::policy::{Automaton, Controller, Matching, Node, Place};
+use pilotage::policy::{Automaton, AutomatonRunner, Matching, Node, Place};
+use pilotage::progress::Silent;
 use pilotage::scenario;
 use pilotage::simulate::{Agent, FilterAgent};
 use pilotage::solve::compile::{self, compile};
@@ -98,7 +98,7 @@ fn synthetic(nodes: usize, matching: Matching) -> Automaton {
 
 /// A step is one decision and one observation.
 fn run(bencher: Bencher, automaton: &Automaton) {
-    let mut controller = Controller::new(automaton);
+    let mut controller = AutomatonRunner::new(automaton);
     let observation = vec![0.2; automaton.filter.readings()];
     bencher.bench_local(|| {
         let (_, action) = black_box(controller.decide());

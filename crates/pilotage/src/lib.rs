@@ -14,7 +14,7 @@
 //! [`model`], [`belief`], [`solve`], [`policy`], [`simulate`]; what is true is a [`world`], into which no agent looks.
 //!
 //! ```
-//! use pilotage::{observe::Silent, scenario, simulate::Options};
+//! use pilotage::{progress::Silent, scenario, simulate::Options};
 //! use pilotage::solve::{Request, ValueIteration, plan};
 //!
 //! // A robot in a corridor of four cells, paid in the last one.
@@ -36,9 +36,9 @@ pub mod error;
 mod files;
 mod memory;
 pub mod model;
-pub mod observe;
 pub mod parallel;
 pub mod policy;
+pub mod progress;
 pub mod random;
 pub mod scenario;
 pub mod simulate;

@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use pilotage::belief::{Belief, BeliefMdp, Filter, Switch};
 use pilotage::model::{Interval, Region, StartShape, Then, When};
 use pilotage::scenario::{self, Scenario, Truth};
-use pilotage::world::{Draws, ProblemWorld, World};
+use pilotage::world::{ProblemWorld, Streams, World};
 
 fn scenario(name: &str) -> Scenario {
     scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
@@ -34,7 +34,7 @@ fn still(name: &str, at: &[f64], mode: usize) -> Scenario {
 fn walk(scenario: &Scenario, plan: &[&str]) -> Vec<(f64, Vec<f64>, usize)> {
     let model = &scenario.model;
     let mut world = ProblemWorld::new(scenario);
-    let mut draws = Draws::new(1, 0);
+    let mut draws = Streams::new(1, 0);
     world.reset(&mut draws);
     let mut sensed = vec![0.0; model.observation_dim()];
     let step = |name: &&str| {
@@ -137,7 +137,7 @@ fn a_uniform_start_fills_its_box_and_is_believed_by_its_moments() {
     let count = 4_000;
     let (mut sum, mut fourth) = ([0.0; 2], 0.0);
     for episode in 0..count {
-        world.reset(&mut Draws::new(9, episode));
+        world.reset(&mut Streams::new(9, episode));
         for (i, sum) in sum.iter_mut().enumerate() {
             let x = world.state()[i];
             assert!((0.0..5.0).contains(&x));
@@ -176,7 +176,7 @@ fn expected_rewards_after_the_move_are_averages_of_the_world() {
         let (mut paid, mut switched) = (0.0, 0.0);
         let count = 4_000;
         for episode in 0..count {
-            let mut draws = Draws::new(11, episode);
+            let mut draws = Streams::new(11, episode);
             world.reset(&mut draws);
             paid += world.step(action, &mut draws, &mut [0.0]).reward / count as f64;
             switched += f64::from(world.mode() != mode) / count as f64;

@@ -5,7 +5,7 @@ mod common;
 
 use common::built_in;
 use pilotage::belief::BeliefMdp;
-use pilotage::policy::{Automaton, Controller, Matching, Node, Place};
+use pilotage::policy::{Automaton, AutomatonRunner, Matching, Node, Place};
 
 fn automaton(name: &str, matching: Matching) -> Automaton {
     let model = built_in(name);
@@ -39,7 +39,7 @@ fn a_controller_allocates_nothing_in_a_step() {
     for name in ["corridor", "load-unload", "maze-2d", "cart-pole"] {
         for matching in [Matching::Nearest, Matching::Segments] {
             let automaton = automaton(name, matching);
-            let mut controller = Controller::new(&automaton);
+            let mut controller = AutomatonRunner::new(&automaton);
             let observation = vec![0.1; automaton.filter.readings()];
             let mut nodes = 0;
             let counted = allocation_counter::measure(|| {

@@ -9,8 +9,8 @@ use common::automata::sealed;
 use pilotage::Error;
 use pilotage::belief::BeliefMdp;
 use pilotage::model::{Interval, Model};
-use pilotage::observe::{Observer, Silent};
-use pilotage::policy::{Automaton, Controller, Node, Place};
+use pilotage::policy::{Automaton, AutomatonRunner, Node, Place};
+use pilotage::progress::{Progress, Silent};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::Run;
@@ -31,7 +31,7 @@ fn learn_in(
     world: &Scenario,
     told: &Model,
     settings: &Settings,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> pilotage::Result<Learned> {
     let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(world)) };
     arkaq::learn(told, &worlds, settings, None, observer)
@@ -64,7 +64,7 @@ fn hurried() -> Settings {
 }
 
 fn earned(scenario: &Scenario, automaton: &Automaton) -> Evaluation {
-    let controller = Controller::new(automaton);
+    let controller = AutomatonRunner::new(automaton);
     evaluate(scenario, &automaton.filter, &controller, OPTIONS, &Silent)
 }
 
@@ -162,7 +162,7 @@ fn merging_leaves_fewer_nodes_and_loses_nothing() {
 #[test]
 fn too_many_states_end_exploration_with_a_clear_statement() {
     struct Notes(Mutex<Vec<String>>);
-    impl Observer for Notes {
+    impl Progress for Notes {
         fn note(&self, message: &str) {
             self.0.lock().unwrap().push(message.to_owned());
         }

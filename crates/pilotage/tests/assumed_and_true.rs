@@ -5,7 +5,7 @@ mod common;
 
 use common::{short, small};
 use pilotage::belief::{Belief, BeliefMdp};
-use pilotage::observe::Silent;
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario, Truth};
 use pilotage::solve::{Form, Registry, Solution, Solved, solve};
 

@@ -8,7 +8,7 @@ use common::built_in;
 use pilotage::Error;
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::model::ActionId;
-use pilotage::policy::{Automaton, Controller, Matching, Policy, write_whole};
+use pilotage::policy::{Automaton, AutomatonRunner, Matching, Policy, write_whole};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::rollout;
 use proptest::prelude::*;
@@ -23,7 +23,7 @@ proptest! {
         beliefs in proptest::collection::vec(
             (0..100_usize, 0..4_usize, proptest::collection::vec(-8.0..8.0_f64, 4)), 20),
     ) {
-        let controller = Controller::new(&automaton);
+        let controller = AutomatonRunner::new(&automaton);
         for (level, mode, mean) in beliefs {
             let belief = Belief {
                 level: level % automaton.levels.len(),
@@ -41,7 +41,7 @@ proptest! {
         means in proptest::collection::vec(proptest::collection::vec(-3..=3_i32, 4), 20),
     ) {
         automaton.scale.fill(1.0);
-        let controller = Controller::new(&automaton);
+        let controller = AutomatonRunner::new(&automaton);
         for mean in means {
             let mean = mean[..automaton.states.len()].iter().copied().map(f64::from).collect();
             let belief = Belief { level: 0, mode: 0, mean };

@@ -5,12 +5,12 @@
 use nalgebra::{DMatrix, dmatrix, dvector};
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::model::{self, Interval, Model, Region};
-use pilotage::observe::Silent;
 use pilotage::policy::Policy;
+use pilotage::progress::Silent;
 use pilotage::random::{Role, normal, stream};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options};
-use pilotage::solve::lqg::{Controller, NearestAction, Weights};
+use pilotage::solve::lqg::{LqgController, NearestAction, Weights};
 use pilotage::solve::lqr::lqr_gain;
 use pilotage::solve::mdp::{self, StateMdp};
 use pilotage::solve::{Form, Lqg, Mls, Planner, Qmdp, Request, Solution, plan};
@@ -84,7 +84,7 @@ fn early_gains_of_a_long_episode_are_the_stationary_one() {
     let mut model = turning();
     model.episode.length = 400;
     let cost = model.cost.clone().unwrap();
-    let controller = Controller::new(&BeliefMdp::new(&model)).unwrap();
+    let controller = LqgController::new(&BeliefMdp::new(&model)).unwrap();
     let root = model.discount.sqrt();
     let (a, b) = (&model.motion.a * root, &model.motion.b * root);
     let stationary = lqr_gain(&a, &b, &cost.state, &cost.control).unwrap();
@@ -93,7 +93,7 @@ fn early_gains_of_a_long_episode_are_the_stationary_one() {
     // With A = B = Q = R = 1 it is the golden ratio less 1.
     let mut scalar = scenario("scalar-lqg").model;
     scalar.episode.length = 60;
-    let controller = Controller::new(&BeliefMdp::new(&scalar)).unwrap();
+    let controller = LqgController::new(&BeliefMdp::new(&scalar)).unwrap();
     assert!((controller.gain(0).unwrap()[0] - (5.0_f64.sqrt() - 1.0) / 2.0).abs() < 1e-12);
 }
 

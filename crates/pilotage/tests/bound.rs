@@ -14,7 +14,7 @@ use pilotage::error::Error;
 use pilotage::model::{
     HypothesisBelief, Interval, Model, Region, StartHypothesis, StartShape, Then,
 };
-use pilotage::observe::Silent;
+use pilotage::progress::Silent;
 use pilotage::scenario::Scenario;
 use pilotage::simulate::{Estimate, Options, evaluate};
 use pilotage::solve::bound::{Bound, Method, Settings, bound};

@@ -9,8 +9,8 @@ mod common;
 use common::{built_in, scenario};
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::model::{ActionId, Model};
-use pilotage::observe::Silent;
-use pilotage::policy::{Controller, Matching, Policy};
+use pilotage::policy::{AutomatonRunner, Matching, Policy};
+use pilotage::progress::Silent;
 use pilotage::scenario::Scenario;
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::compile::{self, compile};
@@ -117,7 +117,7 @@ fn the_value_satisfies_the_bellman_equation() {
         ] {
             for action in 0..3 {
                 let step = mdp.levels().step(level, mdp.levels().class_of(action));
-                let sd = step.correction.spread()[0].sqrt();
+                let sd = step.correction.mean_covariance()[0].sqrt();
                 let centre = mean + model.actions[action].control[0];
                 let expected: f64 = (-400..=400)
                     .map(|k| {
@@ -163,7 +163,7 @@ fn the_tiger_is_worth_4_1065() {
             ..compile::Settings::default()
         };
         let automaton = compile(&policy, policy.mdp(), "value-iteration", &settings).unwrap();
-        let earned = evaluated(&scenario, &Controller::new(&automaton), 100_000).discounted;
+        let earned = evaluated(&scenario, &AutomatonRunner::new(&automaton), 100_000).discounted;
         assert!(earned.mean >= 4.05, "{matching:?}: {earned:?}");
         assert!(
             earned.mean <= planned + 3.0 * earned.stderr,

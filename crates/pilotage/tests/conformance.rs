@@ -7,8 +7,8 @@ use common::{short, small};
 use pilotage::Error;
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::model::{Interval, Model, Region};
-use pilotage::observe::Silent;
-use pilotage::policy::{Automaton, Controller, Policy};
+use pilotage::policy::{Automaton, AutomatonRunner, Policy};
+use pilotage::progress::Silent;
 use pilotage::random::{Rng, Role, normal, stream};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Options;
@@ -82,7 +82,7 @@ fn check_automaton(mdp: &BeliefMdp, automaton: &Automaton, what: &str) {
         "{what}: visits sum to {visits}"
     );
 
-    let controller = Controller::new(automaton);
+    let controller = AutomatonRunner::new(automaton);
     // A learner has memories in place of modes.
     let modes = automaton.modes.len();
     for belief in beliefs(mdp, modes, &mut stream(2, 0, Role::Planner)) {
@@ -94,7 +94,7 @@ fn check_automaton(mdp: &BeliefMdp, automaton: &Automaton, what: &str) {
     }
     let length = mdp.model().episode.length.min(60);
     for run in rollout::decisions(mdp, &automaton.filter, automaton, 3, length, 5) {
-        let mut controller = Controller::new(automaton);
+        let mut controller = AutomatonRunner::new(automaton);
         // A model with several starts is run from each; the controller begins at the first.
         if run[0].belief != *controller.belief() {
             continue;

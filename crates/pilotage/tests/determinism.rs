@@ -5,8 +5,8 @@ mod common;
 
 use common::{built_in, scenario};
 use pilotage::belief::{Belief, BeliefMdp};
-use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Matching, Policy};
+use pilotage::progress::Silent;
 use pilotage::random::{Role, normal, stream, uniform};
 use pilotage::simulate::{Evaluation, Options, evaluate};
 use pilotage::solve::compile::{self, compile};
@@ -114,8 +114,11 @@ fn another_seed_gives_other_episodes() {
     let scenario = scenario("corridor");
     let mdp = BeliefMdp::new(&scenario.model);
     let earned = |seed| {
-        let policy =
-            pilotage::policy::Controller::new(&Automaton::new(&mdp, "east", Matching::Nearest));
+        let policy = pilotage::policy::AutomatonRunner::new(&Automaton::new(
+            &mdp,
+            "east",
+            Matching::Nearest,
+        ));
         let options = Options {
             episodes: 100,
             seed,

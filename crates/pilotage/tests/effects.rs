@@ -8,7 +8,7 @@ use pilotage::model::{
 };
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Estimate;
-use pilotage::world::{Draws, ProblemWorld, World};
+use pilotage::world::{ProblemWorld, Streams, World};
 use proptest::prelude::*;
 
 fn region() -> impl Strategy<Value = Region> {
@@ -108,7 +108,7 @@ fn worlds_and_beliefs_agree_over_all_models() {
                     let mut observation = vec![0.0; model.observation_dim()];
                     let steps: Vec<(f64, bool, usize)> = (0..STEPS)
                         .map(|episode| {
-                            let mut draws = Draws::new(17, episode);
+                            let mut draws = Streams::new(17, episode);
                             world.reset(&mut draws);
                             let step = world.step(action, &mut draws, &mut observation);
                             (step.reward, step.then == Then::Continue, world.mode())

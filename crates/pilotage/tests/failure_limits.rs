@@ -3,8 +3,8 @@
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::error::Error;
 use pilotage::model::{ActionId, Interval, Model, Region};
-use pilotage::observe::Silent;
-use pilotage::policy::{Controller, Policy};
+use pilotage::policy::{AutomatonRunner, Policy};
+use pilotage::progress::Silent;
 use pilotage::scenario::{Scenario, find, read};
 use pilotage::simulate::{LifeOptions, Options, evaluate, life};
 use pilotage::solve::policy_search::failure::{Runs, Sample};
@@ -169,7 +169,7 @@ fn the_probability_of_failing_foretells_life() {
     let mdp = BeliefMdp::new(&model);
     let automaton = search(&mdp, &settings, 1, &Silent).unwrap();
     assert_eq!(automaton.nodes.len(), 2);
-    let policy = Controller::new(&automaton);
+    let policy = AutomatonRunner::new(&automaton);
     let sample = Sample {
         runs: 100,
         steps: 3000,

@@ -276,7 +276,7 @@ proptest! {
         let gained = &correction.predicted - &correction.covariance;
         prop_assert!(least_eigenvalue(&gained) >= -1e-13 * correction.predicted.amax());
         // What is gained is what the mean will move by: K S K' = P- - P (Eq. 5.6, corrected).
-        prop_assert!(apart(&gained, &correction.spread()) <= 1e-12 * correction.predicted.amax());
+        prop_assert!(apart(&gained, &correction.mean_covariance()) <= 1e-12 * correction.predicted.amax());
     }
 
     #[test]

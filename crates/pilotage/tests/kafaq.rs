@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use pilotage::belief::BeliefMdp;
 use pilotage::model::{Interval, Model};
-use pilotage::observe::Silent;
-use pilotage::policy::{Automaton, Controller, Place};
+use pilotage::policy::{Automaton, AutomatonRunner, Place};
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{LifeOptions, Options, compare, evaluate, life};
 use pilotage::solve::Run;
@@ -83,7 +83,7 @@ fn the_hallway_is_learned_in_three_regions_as_well_as_it_can_be_planned() {
         )
         .unwrap();
         let best = evaluate(&scenario, &plan.mdp().filter(), &plan, options, &Silent);
-        let controller = Controller::new(&learned.automaton);
+        let controller = AutomatonRunner::new(&learned.automaton);
         let earned = evaluate(
             &scenario,
             &learned.automaton.filter,
@@ -120,8 +120,8 @@ fn a_hidden_load_becomes_nodes_at_the_same_place_with_opposite_actions() {
         let difference = compare(
             &scenario,
             &learned.automaton.filter,
-            &Controller::new(&learned.automaton),
-            &Controller::new(&one_way(action)),
+            &AutomatonRunner::new(&learned.automaton),
+            &AutomatonRunner::new(&one_way(action)),
             Options {
                 episodes: 300,
                 seed: 5,
@@ -491,7 +491,7 @@ fn a_pole_is_balanced_by_a_few_regions_of_its_own_motion() {
         steps: 100_000,
         seed: 3,
     };
-    let controller = Controller::new(&learned.automaton);
+    let controller = AutomatonRunner::new(&learned.automaton);
     let life = life(
         &scenario,
         &learned.automaton.filter,

@@ -5,13 +5,13 @@ use std::sync::OnceLock;
 
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::model::{Model, WallBelief};
-use pilotage::observe::Silent;
 use pilotage::policy::{Automaton, Policy};
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Options, evaluate};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::value_iteration::{self, GridPolicy};
-use pilotage::world::{Draws, ProblemWorld, World};
+use pilotage::world::{ProblemWorld, Streams, World};
 
 fn find(name: &str) -> Scenario {
     scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
@@ -38,7 +38,7 @@ fn automaton(mdp: &BeliefMdp, policy: &GridPolicy, episodes: usize) -> Automaton
 /// Way of the true state under a plan of actions.
 fn walk(scenario: &Scenario, seed: u64, plan: &[usize]) -> Vec<Vec<f64>> {
     let mut world = ProblemWorld::new(scenario);
-    let mut draws = Draws::new(seed, 0);
+    let mut draws = Streams::new(seed, 0);
     let mut observation = vec![0.0; scenario.model.observation_dim()];
     world.reset(&mut draws);
     let mut way = vec![world.state().to_vec()];

@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use pilotage::belief::gaussian::interval_probability;
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::model::{Interval, Model, Region, Then};
-use pilotage::observe::Silent;
+use pilotage::progress::Silent;
 use pilotage::scenario::Scenario;
 use pilotage::simulate::{Estimate, Options, evaluate};
 use pilotage::solve::kbvi::branches::{Branches, Settings};

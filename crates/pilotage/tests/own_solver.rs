@@ -8,15 +8,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use pilotage::Result;
 use pilotage::belief::Belief;
 use pilotage::model::{ActionId, Model};
-use pilotage::observe::{Observer, Silent};
 use pilotage::policy::{Automaton, Matching, Node, Place, Policy};
+use pilotage::progress::{Progress, Silent};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Options;
 use pilotage::solve::{
     Course, Entry, Form, Learned, Learner, Learning, Lesson, Owner, Plan, Planner, Problem,
     Registry, Request, Run, Settings, Solution, Worlds, run_course, solve,
 };
-use pilotage::world::{Draws, World};
+use pilotage::world::{Streams, World};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -54,7 +54,7 @@ impl Planner for Stubborn {
             })
     }
 
-    fn plan(&self, problem: &Problem, _: &dyn Observer) -> Result<Plan> {
+    fn plan(&self, problem: &Problem, _: &dyn Progress) -> Result<Plan> {
         Ok(Plan::rule(self.clone(), problem.mdp().clone()))
     }
 }
@@ -97,7 +97,7 @@ impl Learner for Bandit {
         problem: &Problem,
         worlds: &Worlds<'_>,
         checkpoint: Option<&Path>,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Result<Lesson> {
         let settings = Self {
             seed: problem.seed(),
@@ -161,7 +161,7 @@ impl Course for Trials<'_> {
         }
     }
 
-    fn step(&self, state: &mut State, observer: &dyn Observer) -> Result<ControlFlow<()>> {
+    fn step(&self, state: &mut State, observer: &dyn Progress) -> Result<ControlFlow<()>> {
         let (model, action) = (self.problem.model(), state.returns.len());
         if action == model.actions.len() {
             return Ok(ControlFlow::Break(()));
@@ -170,7 +170,7 @@ impl Course for Trials<'_> {
         let mut observation = vec![0.0; model.observation_dim()];
         let mut sum = 0.0;
         for episode in 0..self.settings.episodes as u64 {
-            let mut draws = Draws::new(self.settings.seed, episode);
+            let mut draws = Streams::new(self.settings.seed, episode);
             world.reset(&mut draws);
             for _ in 0..model.episode.length {
                 sum += world.step(action, &mut draws, &mut observation).reward;
@@ -207,7 +207,7 @@ struct Impatient {
     left: AtomicUsize,
 }
 
-impl Observer for Impatient {
+impl Progress for Impatient {
     fn goes_on(&self) -> ControlFlow<()> {
         match self.left.fetch_sub(1, Ordering::Relaxed) {
             0 => ControlFlow::Break(()),

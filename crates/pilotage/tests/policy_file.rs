@@ -8,7 +8,7 @@ use common::built_in;
 use pilotage::Error;
 use pilotage::belief::LARGEST;
 use pilotage::model::Model;
-use pilotage::policy::{Automaton, Controller, Coordinates, Matching, Node, Place};
+use pilotage::policy::{Automaton, AutomatonRunner, Coordinates, Matching, Node, Place};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -693,7 +693,7 @@ fn paths(value: &Value, here: &str, found: &mut Vec<String>) {
 
 /// Runs an automaton on readings that are not what its filter expects.
 fn runs(automaton: &Automaton) {
-    let mut controller = Controller::new(automaton);
+    let mut controller = AutomatonRunner::new(automaton);
     for step in 0..60_i32 {
         let (node, action) = controller.decide();
         assert!(node < automaton.nodes.len() && action < automaton.actions.len());

@@ -12,12 +12,12 @@ use std::process::{Command, Stdio};
 use common::automata::any_automaton;
 use common::scenario;
 use pilotage::model::Then;
-use pilotage::observe::Silent;
-use pilotage::policy::{Automaton, Controller};
+use pilotage::policy::{Automaton, AutomatonRunner};
+use pilotage::progress::Silent;
 use pilotage::random::{Role, normal, stream};
 use pilotage::scenario::Scenario;
 use pilotage::solve::{Arkaq, Form, Kafaq, PolicySearch, Registry, Request, Solver, solve};
-use pilotage::world::{Draws, ProblemWorld, World};
+use pilotage::world::{ProblemWorld, Streams, World};
 use proptest::prelude::*;
 
 fn root() -> PathBuf {
@@ -49,8 +49,8 @@ type Event = Option<Vec<f64>>;
 
 /// The rows of the library's own runner.
 fn run(automaton: &Automaton, events: &[Event]) -> Vec<Row> {
-    let mut controller = Controller::new(automaton);
-    let row = |controller: &Controller| {
+    let mut controller = AutomatonRunner::new(automaton);
+    let row = |controller: &AutomatonRunner| {
         let (belief, (node, action)) = (controller.belief(), controller.decide());
         let row = Row {
             level: belief.level,
@@ -154,8 +154,8 @@ fn compare(automaton: &Automaton, events: &[Event]) {
 /// What the world of a scenario lets an automaton sense in so many steps.
 fn events(scenario: &Scenario, automaton: &Automaton, steps: usize) -> Vec<Event> {
     let mut world = ProblemWorld::new(scenario);
-    let mut controller = Controller::new(automaton);
-    let mut draws = Draws::new(4, 0);
+    let mut controller = AutomatonRunner::new(automaton);
+    let mut draws = Streams::new(4, 0);
     let mut observation = vec![0.0; automaton.filter.readings()];
     world.reset(&mut draws);
     let mut events = Vec::new();

@@ -3,7 +3,7 @@
 
 use pilotage::belief::BeliefMdp;
 use pilotage::model::{Interval, Region, Reward, Steps, When};
-use pilotage::observe::Silent;
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Options, compare};
 use pilotage::solve::policy_search::Objective;

@@ -3,7 +3,7 @@
 
 use pilotage::belief::BeliefMdp;
 use pilotage::model::{Model, Steps};
-use pilotage::observe::Silent;
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Options;
 use pilotage::solve::value_iteration::Settings;

@@ -3,12 +3,12 @@
 
 use pilotage::Error;
 use pilotage::model::Model;
-use pilotage::observe::Silent;
-use pilotage::policy::Controller;
+use pilotage::policy::AutomatonRunner;
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario, Simulator, Walls};
 use pilotage::simulate::{Options, evaluate};
 use pilotage::solve::kafaq::{Settings, learn};
-use pilotage::world::{Draws, ProblemWorld, World};
+use pilotage::world::{ProblemWorld, Streams, World};
 
 const PROBLEMS: [&str; 3] = ["basic", "maze-4x4", "cart-load-unload"];
 
@@ -41,7 +41,7 @@ fn a_robot_file_is_its_problem_in_another_world() {
 fn the_robot_senses_as_well_as_the_agent_assumes() {
     let robot = robot_of("maze-4x4");
     let mut world = ProblemWorld::new(&robot);
-    let mut draws = Draws::new(4, 0);
+    let mut draws = Streams::new(4, 0);
     let (mut square, mut count) = (0.0, 0.0);
     let mut reading = [0.0; 2];
     for episode in 0..50 {
@@ -74,7 +74,7 @@ fn what_was_learned_elsewhere_earns_its_return_on_the_robot() {
         let automaton = &learned.automaton;
         automaton.check_problem(&plain.model, "policy").unwrap();
         automaton.check_world(&robot.model, "policy").unwrap();
-        let controller = Controller::new(automaton);
+        let controller = AutomatonRunner::new(automaton);
         let [there, here] = [&plain, &robot]
             .map(|world| evaluate(world, &automaton.filter, &controller, options, &Silent));
         assert!(

@@ -5,8 +5,8 @@ use std::sync::OnceLock;
 
 use pilotage::belief::{Belief, BeliefMdp, Merge, Tracker, Tracking};
 use pilotage::model::ActionId;
-use pilotage::observe::Silent;
 use pilotage::policy::Policy;
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Agent;
 use pilotage::simulate::wake_up::{Choice, Settings, WakeUp, WakeUpAgent, measure};

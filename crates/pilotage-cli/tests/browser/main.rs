@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use devtools::Tab;
-use pilotage::observe::Silent;
+use pilotage::progress::Silent;
 use pilotage_report::{
     Algorithm, Figure, Finding, Report, Series, Table, Verdict, curves_svg, page_html,
 };

@@ -14,8 +14,8 @@ mod run;
 use std::path::Path;
 
 use pilotage::model::Model;
-use pilotage::observe::Silent;
 use pilotage::policy::write_whole;
+use pilotage::progress::Silent;
 use pilotage::scenario;
 use pilotage::simulate::Options;
 use pilotage::solve::value_iteration;

@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use pilotage::belief::BeliefMdp;
-use pilotage::observe::Silent;
-use pilotage::policy::Controller;
+use pilotage::policy::AutomatonRunner;
+use pilotage::progress::Silent;
 use pilotage::scenario::Scenario;
 use pilotage::simulate::{Evaluation, LifeOptions, evaluate, life};
 use pilotage::solve::compile;
@@ -39,7 +39,7 @@ impl Run {
             seed,
         );
         let automaton = &learned.automaton;
-        let controller = Controller::new(automaton);
+        let controller = AutomatonRunner::new(automaton);
         let earned =
             |world: &Scenario| evaluate(world, &automaton.filter, &controller, EVALUATION, &Silent);
         Self {
@@ -84,7 +84,7 @@ impl Pole {
             steps: POLE_STEPS,
             seed: EVALUATION.seed + seed,
         };
-        let controller = Controller::new(&learned.automaton);
+        let controller = AutomatonRunner::new(&learned.automaton);
         let life = life(
             scenario,
             &learned.automaton.filter,

@@ -48,7 +48,7 @@ impl Correction {
     }
 
     /// Covariance of the change of mean that the observation brings, `K S K' = P- - P` (Eq. 5.6, corrected).
-    pub fn spread(&self) -> DMatrix<f64> {
+    pub fn mean_covariance(&self) -> DMatrix<f64> {
         symmetric(&self.gain * &self.innovation * self.gain.transpose())
     }
 }

@@ -269,10 +269,10 @@ impl LevelGraph {
     /// Covariance of the next mean around its prediction after a step of a class: `K S K'`. Where levels were cut, what the step
     /// would leave of the uncertainty is not what the level it leads to has, and the mean moves by the difference that is true of these
     /// two, `P- - P`, so that looking is not worth more than it tells.
-    pub fn spread(&self, level: LevelId, class: ClassId) -> DMatrix<f64> {
+    pub fn mean_covariance(&self, level: LevelId, class: ClassId) -> DMatrix<f64> {
         let step = &self.steps[level][class];
         if !step.cut {
-            return step.correction.spread();
+            return step.correction.mean_covariance();
         }
         let root = square_root(&(&step.correction.predicted - &self.covariances[step.next]));
         &root * root.transpose()

@@ -334,7 +334,7 @@ impl BeliefMdp {
     }
 
     /// Where the next mean is centred, with which weight: the predicted mean `A m + B u`, moved by what each hypothesis makes the
-    /// agent observe. The innovation's own noise has covariance [`BeliefMdp::spread`] around it.
+    /// agent observe. The innovation's own noise has covariance [`BeliefMdp::mean_covariance`] around it.
     pub fn centres(
         &self,
         level: LevelId,
@@ -356,10 +356,10 @@ impl BeliefMdp {
 
     /// Covariance of the next mean around its centre after an action of this class: `K S K'` (Eq. 5.6, corrected); for a mixture
     /// with the `S` of each of its hypotheses.
-    pub fn spread(&self, level: LevelId, class: usize) -> DMatrix<f64> {
+    pub fn mean_covariance(&self, level: LevelId, class: usize) -> DMatrix<f64> {
         let step = self.levels.step(level, class);
         match self.read_as_mixture() {
-            None => self.levels.spread(level, class),
+            None => self.levels.mean_covariance(level, class),
             Some(mixture) => {
                 let (gain, h) = (&step.correction.gain, &self.model.sensor.h);
                 let noise = &self.levels.classes()[class].sensor_noise;

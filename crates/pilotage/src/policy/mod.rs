@@ -4,18 +4,18 @@ mod automaton;
 mod builder;
 mod check;
 mod components;
-mod controller;
 mod convert;
 mod coordinates;
 mod file;
 mod layout;
+mod runner;
 mod store;
 
 pub use crate::files::{check_writable, write_whole};
 pub use automaton::{Automaton, Matching, Node, NodeId, Observed, Place};
-pub use controller::Controller;
 pub use coordinates::{Coordinates, MOST_COORDINATES};
 pub use file::schema;
+pub use runner::AutomatonRunner;
 
 use crate::belief::Belief;
 use crate::model::ActionId;

@@ -8,11 +8,11 @@ use super::estimate::{Estimate, Moments};
 use super::{Agent, Episode, FilterAgent, run_episode};
 use crate::belief::Filter;
 use crate::error::{Error, Result};
-use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::Policy;
+use crate::progress::Progress;
 use crate::scenario::Scenario;
-use crate::world::{Draws, ProblemWorld};
+use crate::world::{ProblemWorld, Streams};
 
 /// How to evaluate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,7 +90,7 @@ pub fn evaluate(
     filter: &Filter,
     policy: &dyn Policy,
     options: Options,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Evaluation {
     summarise(options, observer, &|| {
         episodes(
@@ -108,7 +108,7 @@ pub fn compare(
     first: &dyn Policy,
     second: &dyn Policy,
     options: Options,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Difference {
     let mut difference = Moments::default();
     let runner = || {
@@ -145,7 +145,7 @@ fn episodes<'a>(
         run_episode(
             &mut world,
             agent.as_mut(),
-            &mut Draws::new(options.seed, episode),
+            &mut Streams::new(options.seed, episode),
             &mut observation,
             limits,
             &mut |_, _| {},
@@ -158,7 +158,7 @@ fn episodes<'a>(
 pub(crate) fn run_all<'a, T: Send>(
     episodes: usize,
     stage: &'static str,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
     runner: &(dyn Fn() -> Runner<'a, T> + Sync),
     take: &mut dyn FnMut(T),
 ) {
@@ -183,7 +183,7 @@ pub(crate) fn run_all<'a, T: Send>(
 /// Runs all episodes, and what they earned.
 pub(crate) fn summarise<'a>(
     options: Options,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
     runner: &(dyn Fn() -> Runner<'a, Episode> + Sync),
 ) -> Evaluation {
     let [mut discounted, mut undiscounted, mut steps] = [Moments::default(); 3];

@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 use super::{Agent, Estimate, FilterAgent};
 use crate::belief::Filter;
 use crate::model::{Model, Then};
-use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::Policy;
+use crate::progress::Progress;
 use crate::scenario::Scenario;
-use crate::world::{Draws, ProblemWorld, World};
+use crate::world::{ProblemWorld, Streams, World};
 
 /// How long to watch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,13 +86,13 @@ pub fn life(
     filter: &Filter,
     policy: &dyn Policy,
     options: LifeOptions,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Life {
     let done = std::sync::atomic::AtomicU64::new(0);
     let runs = parallel::map(options.runs, |run| {
         let mut world = ProblemWorld::new(scenario);
         let mut agent = FilterAgent::new(filter, policy);
-        let mut draws = Draws::new(options.seed, run as u64);
+        let mut draws = Streams::new(options.seed, run as u64);
         let counted = run_lives(
             &mut world,
             &mut agent,
@@ -110,7 +110,7 @@ pub fn life(
 fn run_lives(
     world: &mut dyn World,
     agent: &mut dyn Agent,
-    draws: &mut Draws,
+    draws: &mut Streams,
     model: &Model,
     steps: u64,
 ) -> Run {

@@ -14,7 +14,7 @@ pub use life::{Life, LifeOptions, Run, life};
 
 use crate::belief::is_kept;
 use crate::model::{ActionId, Then};
-use crate::world::{Draws, World};
+use crate::world::{Streams, World};
 
 /// What one episode earned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,7 +57,7 @@ pub struct Moment<'a> {
 pub fn run_episode(
     world: &mut dyn World,
     agent: &mut dyn Agent,
-    draws: &mut Draws,
+    draws: &mut Streams,
     observation: &mut [f64],
     (length, discount): (usize, f64),
     watch: &mut dyn FnMut(&Moment<'_>, &dyn Agent),

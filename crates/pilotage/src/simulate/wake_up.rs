@@ -12,10 +12,10 @@ use super::{Agent, Estimate, FilterAgent, run_episode};
 use crate::belief::{Belief, BeliefMdp, Filter, Tracker, Tracking};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Region};
-use crate::observe::Observer;
 use crate::policy::Policy;
+use crate::progress::Progress;
 use crate::scenario::{Scenario, Truth};
-use crate::world::{Draws, ProblemWorld};
+use crate::world::{ProblemWorld, Streams};
 
 /// Which action a lost agent takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -253,7 +253,7 @@ pub fn measure(
     truth: &Truth,
     policy: &dyn Policy,
     settings: &Settings,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<WakeUp> {
     let goals = mdp.model().goals();
     check(mdp, &goals, settings)?;
@@ -278,7 +278,7 @@ pub fn measure(
         let mut world = ProblemWorld::new(scenario);
         let mut lost = agent.clone();
         Box::new(move |episode| {
-            let draws = || Draws::new(settings.seed, episode);
+            let draws = || Streams::new(settings.seed, episode);
             let of_lost = run(&mut world, &mut lost, draws(), goals, &scenario.model);
             let mut knows = FilterAgent::new(&told[world.hypothesis()], policy);
             Pair {
@@ -320,7 +320,7 @@ fn check(mdp: &BeliefMdp, goals: &[Region], settings: &Settings) -> Result<()> {
 fn run(
     world: &mut ProblemWorld,
     agent: &mut dyn Agent,
-    mut draws: Draws,
+    mut draws: Streams,
     goals: &[Region],
     model: &crate::model::Model,
 ) -> Run {

@@ -17,9 +17,9 @@ use crate::belief::BeliefMdp;
 use crate::error::Result;
 use crate::memory;
 use crate::model::{ActionId, HypothesisBelief, ModeId, Model, Outcome, Then, WallBelief};
-use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::first_best;
+use crate::progress::Progress;
 
 /// Most state variables for which a grid of true states is fine enough to be of use.
 pub const MOST_VARIABLES: usize = 3;
@@ -88,7 +88,7 @@ impl StateMdp {
     pub fn solve(
         belief_mdp: &BeliefMdp,
         settings: &Settings,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Result<Self> {
         settings.validate()?;
         let space = space(belief_mdp, settings)?;

@@ -14,8 +14,8 @@ use super::solver::{Plan, Planner, Problem};
 use crate::belief::{Belief, BeliefMdp};
 use crate::error::Result;
 use crate::model::{ActionId, Model};
-use crate::observe::Observer;
 use crate::policy::Policy;
+use crate::progress::Progress;
 
 /// Name of the solver in errors and policies.
 const SOLVER: &str = "mls";
@@ -43,7 +43,7 @@ impl Planner for Mls {
         mdp::accepts(SOLVER, model)
     }
 
-    fn plan(&self, problem: &Problem, observer: &dyn Observer) -> Result<Plan> {
+    fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
         let policy = MostLikelyState::solve(problem.mdp(), &self.grid, observer)?;
         let converged = policy.converged();
         Ok(Plan {
@@ -67,7 +67,7 @@ impl MostLikelyState {
     pub fn solve(
         belief_mdp: &BeliefMdp,
         settings: &Settings,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Result<Self> {
         let mdp = StateMdp::solve(belief_mdp, settings, observer)?;
         Ok(Self { mdp })

@@ -4,7 +4,7 @@ use super::Solution;
 use crate::belief::BeliefMdp;
 use crate::error::Result;
 use crate::model::{HypothesisBelief, Model, WallBelief};
-use crate::observe::Observer;
+use crate::progress::Progress;
 use crate::scenario::{Scenario, Walls};
 use crate::simulate::{Evaluation, Options};
 
@@ -42,7 +42,7 @@ impl Solution {
         &self,
         scenario: &Scenario,
         options: Options,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Result<Earned> {
         let world = self.evaluate(scenario, options, observer)?;
         let assumed = match scenario.is_as_assumed() {

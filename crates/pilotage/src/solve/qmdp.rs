@@ -19,9 +19,9 @@ use super::solver::{Plan, Planner, Problem};
 use crate::belief::{Belief, BeliefMdp};
 use crate::error::Result;
 use crate::model::{ActionId, Model};
-use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::{Policy, first_best};
+use crate::progress::Progress;
 
 /// Name of the solver in errors and policies.
 const SOLVER: &str = "qmdp";
@@ -49,7 +49,7 @@ impl Planner for Qmdp {
         mdp::accepts(SOLVER, model)
     }
 
-    fn plan(&self, problem: &Problem, observer: &dyn Observer) -> Result<Plan> {
+    fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
         let policy = QmdpPolicy::solve(problem.mdp(), &self.grid, observer)?;
         let converged = policy.converged();
         Ok(Plan {
@@ -76,7 +76,7 @@ impl QmdpPolicy {
     pub fn solve(
         belief_mdp: &BeliefMdp,
         settings: &Settings,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Result<Self> {
         let mdp = StateMdp::solve(belief_mdp, settings, observer)?;
         let (levels, actions) = (belief_mdp.levels(), belief_mdp.model().actions.len());

@@ -8,7 +8,7 @@ use crate::policy::Policy;
 use crate::scenario::Scenario;
 use crate::simulate::{Agent, FilterAgent, run_episode};
 use crate::solve::settings::ensure;
-use crate::world::{Draws, ProblemWorld, World};
+use crate::world::{ProblemWorld, Streams, World};
 
 /// One decision: where it was taken, what was done, and what was sensed on the way there.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,14 +62,14 @@ pub fn decisions(
     };
     parallel::map(episodes, |episode| {
         let mut world = ProblemWorld::new(&scenario);
-        world.reset(&mut Draws::new(seed, episode as u64));
+        world.reset(&mut Streams::new(seed, episode as u64));
         let mut agent = Recorder {
             inner: FilterAgent::new(&told[world.hypothesis().min(told.len() - 1)], policy),
             sensed: Vec::new(),
             decisions: Vec::new(),
         };
         let mut observation = vec![0.0; model.observation_dim()];
-        let mut draws = Draws::new(seed, episode as u64);
+        let mut draws = Streams::new(seed, episode as u64);
         run_episode(
             &mut world,
             &mut agent,

@@ -5,8 +5,8 @@ use super::solver::{Found, Learner, Plan, Planner, Problem, Request, Solver};
 use super::{Form, Solution, Solved, compile};
 use crate::error::Result;
 use crate::model::Model;
-use crate::observe::Observer;
-use crate::policy::{Automaton, Controller};
+use crate::policy::{Automaton, AutomatonRunner};
+use crate::progress::Progress;
 use crate::scenario::Scenario;
 use crate::world::{ProblemWorld, World};
 
@@ -18,7 +18,7 @@ pub fn solve(
     solver: &Solver,
     scenario: &Scenario,
     request: &Request,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<Solution> {
     match solver {
         Solver::Planner(planner) => plan(planner.as_ref(), &scenario.model, request, observer),
@@ -35,7 +35,7 @@ pub fn plan(
     planner: &dyn Planner,
     model: &Model,
     request: &Request,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<Solution> {
     check_runs("runs", request.runs)?;
     let problem = Problem::new(model, request);
@@ -72,7 +72,7 @@ pub fn plan(
             Solved::Automaton(annotated(automaton, &problem, request))
         }
         (Found::Automaton(automaton), _) => {
-            let (policy, settings) = (Controller::new(&automaton), compiler(request));
+            let (policy, settings) = (AutomatonRunner::new(&automaton), compiler(request));
             let compiled = compile::compile(&policy, problem.mdp(), planner.name(), &settings)?;
             Solved::Automaton(compiled)
         }
@@ -98,7 +98,7 @@ pub fn learn(
     learner: &dyn Learner,
     scenario: &Scenario,
     request: &Request,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<Solution> {
     let model = &scenario.model;
     check_runs("runs", request.runs)?;
@@ -145,6 +145,6 @@ fn annotated(mut automaton: Automaton, problem: &Problem, request: &Request) -> 
 fn asked_anew(automaton: &Automaton) -> Solved {
     Solved::Rule {
         filter: automaton.filter.clone(),
-        policy: Box::new(Controller::new(automaton)),
+        policy: Box::new(AutomatonRunner::new(automaton)),
     }
 }

@@ -4,8 +4,8 @@ use super::lqg;
 use crate::belief::Filter;
 use crate::error::{Error, Result};
 use crate::model::suggest;
-use crate::observe::Observer;
-use crate::policy::{Automaton, Controller, Matching, Policy};
+use crate::policy::{Automaton, AutomatonRunner, Matching, Policy};
+use crate::progress::Progress;
 use crate::scenario::Scenario;
 use crate::simulate::{Difference, Evaluation, Options, compare, evaluate};
 
@@ -105,7 +105,7 @@ pub enum Solved {
     /// A finite automaton, with its filter inside.
     Automaton(Automaton),
     /// A feedback on the mean that gives a free control, with its filter inside.
-    Control(lqg::Controller),
+    Control(lqg::LqgController),
     /// A rule that is asked at every belief, and the filter that keeps the belief.
     Rule {
         /// The rule.
@@ -131,12 +131,12 @@ impl Solution {
         planner: &Self,
         scenario: &Scenario,
         options: Options,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Option<Difference> {
         let Solved::Rule { policy, filter } = &planner.policy else {
             return None;
         };
-        let compiled = Controller::new(self.automaton()?);
+        let compiled = AutomatonRunner::new(self.automaton()?);
         let (planner, compiled): (&dyn Policy, &dyn Policy) = (policy.as_ref(), &compiled);
         Some(compare(
             scenario, filter, planner, compiled, options, observer,
@@ -146,16 +146,16 @@ impl Solution {
     /// Runs the policy in the scenario's world, by the standard of [`crate::simulate`].
     ///
     /// # Errors
-    /// As [`lqg::Controller::evaluate`], for a free control.
+    /// As [`lqg::LqgController::evaluate`], for a free control.
     pub fn evaluate(
         &self,
         scenario: &Scenario,
         options: Options,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Result<Evaluation> {
         Ok(match &self.policy {
             Solved::Automaton(automaton) => {
-                let controller = Controller::new(automaton);
+                let controller = AutomatonRunner::new(automaton);
                 evaluate(scenario, &automaton.filter, &controller, options, observer)
             }
             Solved::Control(controller) => controller.evaluate(scenario, options, observer)?,

@@ -7,8 +7,8 @@ use super::{Form, Learning};
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
 use crate::model::Model;
-use crate::observe::Observer;
 use crate::policy::{Automaton, Policy};
+use crate::progress::Progress;
 use crate::world::World;
 
 /// Finds a policy from what is assumed. Its value carries its settings.
@@ -26,7 +26,7 @@ pub trait Planner: Send + Sync {
     ///
     /// # Errors
     /// As [`Planner::accepts`], [`Error::Setting`] for settings out of range, and the planner's own.
-    fn plan(&self, problem: &Problem, observer: &dyn Observer) -> Result<Plan>;
+    fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan>;
 
     /// Whether what it finds for a model becomes an automaton: all but a free control does.
     fn makes_automaton(&self, model: &Model) -> bool {
@@ -60,7 +60,7 @@ pub trait Learner: Send + Sync {
         problem: &Problem,
         worlds: &Worlds<'_>,
         checkpoint: Option<&Path>,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Result<Lesson>;
 }
 
@@ -217,7 +217,7 @@ pub enum Found {
     /// An automaton.
     Automaton(Automaton),
     /// A feedback on the mean that gives a free control.
-    Control(lqg::Controller),
+    Control(lqg::LqgController),
 }
 
 impl Plan {

@@ -20,11 +20,11 @@ use crate::random::{Rng, Role, stream};
 /// A world to act in.
 pub trait World: Send {
     /// Draws a new true start.
-    fn reset(&mut self, draws: &mut Draws);
+    fn reset(&mut self, draws: &mut Streams);
 
     /// Takes an action: pays `r(s, a)`, lets events happen, moves the state and writes what is then sensed (length `m`) to
     /// `observation`. Nothing is sensed when the episode ends or restarts.
-    fn step(&mut self, action: ActionId, draws: &mut Draws, observation: &mut [f64]) -> Step;
+    fn step(&mut self, action: ActionId, draws: &mut Streams, observation: &mut [f64]) -> Step;
 
     /// What is paid besides in the current state because an episode ends there, in units of reward.
     fn ending(&self) -> f64 {
@@ -65,14 +65,14 @@ pub struct Step {
 
 /// The streams of random numbers of one episode in the world.
 #[derive(Debug)]
-pub struct Draws {
+pub struct Streams {
     /// For start and motion.
     pub world: Rng,
     /// For sensors.
     pub sensor: Rng,
 }
 
-impl Draws {
+impl Streams {
     /// The streams of an episode.
     pub fn new(seed: u64, episode: u64) -> Self {
         Self {

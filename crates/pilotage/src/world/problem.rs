@@ -4,7 +4,7 @@ use super::cart_pole::CartAndPole;
 use super::linear::Linear;
 use super::noise::Noise;
 use super::robot::Driven;
-use super::{Body, Draws, Step, World};
+use super::{Body, Step, Streams, World};
 use crate::model::{
     ActionId, Barriers, Effect, ModeId, Model, Outcome, StartHypothesis, StartShape, Tally, Then,
     When,
@@ -69,7 +69,7 @@ impl ProblemWorld {
         self.hypothesis
     }
 
-    fn move_on(&mut self, mode: ModeId, action: ActionId, draws: &mut Draws) {
+    fn move_on(&mut self, mode: ModeId, action: ActionId, draws: &mut Streams) {
         let doing = (mode, action);
         self.body
             .advance(doing, &self.state, &mut self.scratch, &mut draws.world);
@@ -87,7 +87,7 @@ impl ProblemWorld {
     }
 
     /// Draws a state from the start hypothesis.
-    fn draw_start(&mut self, draws: &mut Draws) {
+    fn draw_start(&mut self, draws: &mut Streams) {
         let (start, noise) = &self.starts[self.hypothesis];
         self.state.copy_from_slice(start.mean.as_slice());
         match start.shape {
@@ -106,7 +106,7 @@ impl ProblemWorld {
     }
 
     /// A step that ends or restarts the episode.
-    fn close(&mut self, reward: f64, then: Then, draws: &mut Draws) -> Step {
+    fn close(&mut self, reward: f64, then: Then, draws: &mut Streams) -> Step {
         if then == Then::Restart {
             self.reset(draws);
         }
@@ -119,7 +119,7 @@ impl ProblemWorld {
 }
 
 impl World for ProblemWorld {
-    fn reset(&mut self, draws: &mut Draws) {
+    fn reset(&mut self, draws: &mut Streams) {
         let mut chance = uniform(&mut draws.world);
         let chosen = self.starts.iter().position(|(start, _)| {
             chance -= start.weight;
@@ -137,7 +137,7 @@ impl World for ProblemWorld {
         }
     }
 
-    fn step(&mut self, action: ActionId, draws: &mut Draws, observation: &mut [f64]) -> Step {
+    fn step(&mut self, action: ActionId, draws: &mut Streams, observation: &mut [f64]) -> Step {
         let doing = (self.mode, action);
         let mut tally = self.model.tally(self.mode, action);
         tally.reward += self.model.running_cost(&self.state, None, action);

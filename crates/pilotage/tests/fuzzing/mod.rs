@@ -10,13 +10,13 @@ use std::time::{Duration, Instant};
 
 use pilotage::belief::BeliefMdp;
 use pilotage::model::Model;
-use pilotage::observe::Silent;
-use pilotage::policy::{Automaton, Controller, Coordinates, Matching};
+use pilotage::policy::{Automaton, AutomatonRunner, Coordinates, Matching};
+use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{FilterAgent, run_episode};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::{Registry, Run, arkaq, grid, kafaq, value_iteration};
-use pilotage::world::{Draws, ProblemWorld, World};
+use pilotage::world::{ProblemWorld, Streams, World};
 
 pub use mutate::numbers;
 
@@ -144,7 +144,7 @@ fn run(scenario: &Scenario, mdp: &BeliefMdp) {
     let mut agent = FilterAgent::new(&filter, &First);
     let mut observation = vec![0.0; model.observation_dim()];
     let limits = (model.episode.length, model.discount);
-    let mut draws = Draws::new(1, 0);
+    let mut draws = Streams::new(1, 0);
     run_episode(
         &mut world,
         &mut agent,
@@ -212,7 +212,7 @@ fn policies() -> Reader {
 
 /// Acts on what hardly any sensor says.
 fn use_policy(automaton: &Automaton) {
-    let mut controller = Controller::new(automaton);
+    let mut controller = AutomatonRunner::new(automaton);
     controller.reset();
     let readings = automaton.filter.readings();
     for reading in [

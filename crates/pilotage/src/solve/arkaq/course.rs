@@ -11,7 +11,7 @@ use super::task::{SOLVER, Task};
 use super::world_model::WorldModel;
 use super::{Learned, Learning, Point, merge, world_model};
 use crate::error::Result;
-use crate::observe::Observer;
+use crate::progress::Progress;
 use crate::solve::learn::{Course, Experience, Owner, critical, fitting, undiscounted};
 
 /// All that a run has to remember between two pieces of work.
@@ -70,7 +70,7 @@ impl Course for Task<'_> {
     }
 
     /// An epoch of a policy, and what follows from it where it was the last at a vigilance.
-    fn step(&self, state: &mut State, observer: &dyn Observer) -> Result<ControlFlow<()>> {
+    fn step(&self, state: &mut State, observer: &dyn Progress) -> Result<ControlFlow<()>> {
         if !state.finished {
             state.run_epoch(self, observer);
             if state.policy.finished(self) {
@@ -122,7 +122,7 @@ impl State {
                 .all(|best| best.draft.fits(task) && best.world.fits(task))
     }
 
-    fn run_epoch(&mut self, task: &Task<'_>, observer: &dyn Observer) {
+    fn run_epoch(&mut self, task: &Task<'_>, observer: &dyn Progress) {
         let states = self.world.states.len();
         if self.policy.epochs() == 0 {
             observer.note(&self.world.describe());
@@ -145,7 +145,7 @@ impl State {
     }
 
     /// Makes the automaton of a vigilance and keeps it if it earns surely more than the best so far.
-    fn conclude(&mut self, task: &Task<'_>, observer: &dyn Observer) {
+    fn conclude(&mut self, task: &Task<'_>, observer: &dyn Progress) {
         let draft = self.policy.draft(&self.world);
         let mut adopted = true;
         if task.settings.vigilances.len() > 1 {

@@ -37,7 +37,7 @@ pub use settings::Settings;
 
 use crate::error::Result;
 use crate::model::{ActionId, Model};
-use crate::observe::Observer;
+use crate::progress::Progress;
 use crate::scenario::Scenario;
 use crate::solve::learn::{self, Course};
 use crate::solve::solver::refuse_if;
@@ -109,7 +109,7 @@ pub fn learn(
     worlds: &Worlds<'_>,
     settings: &Settings,
     checkpoint: Option<&Path>,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<Learned> {
     learn::learn(course(model, worlds, settings)?, checkpoint, observer)
 }
@@ -131,7 +131,7 @@ impl Learner for Settings {
         problem: &Problem,
         worlds: &Worlds<'_>,
         checkpoint: Option<&Path>,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Result<Lesson> {
         let settings = Self {
             seed: problem.seed(),

@@ -40,7 +40,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::model::Model;
-use crate::observe::Observer;
+use crate::progress::Progress;
 use ceiling::Ceiling;
 use frame::Frame;
 
@@ -113,7 +113,7 @@ impl Bound {
 /// # Errors
 /// [`Error::Setting`] for settings out of range; [`Error::Unsupported`] for a model with a quadratic cost, whose best value is known
 /// in closed form ([`crate::solve::lqg`]), and for rewards too large to be added.
-pub fn bound(model: &Model, settings: &Settings, observer: &dyn Observer) -> Result<Bound> {
+pub fn bound(model: &Model, settings: &Settings, observer: &dyn Progress) -> Result<Bound> {
     check(model, settings)?;
     let refuse = |reason: &str| {
         Err(Error::Unsupported {
@@ -170,7 +170,7 @@ fn check(model: &Model, settings: &Settings) -> Result<()> {
 }
 
 /// The least bound that is known for the model.
-fn least(model: &Model, settings: &Settings, observer: &dyn Observer) -> (f64, Method) {
+fn least(model: &Model, settings: &Settings, observer: &dyn Progress) -> (f64, Method) {
     if let Ok(bound) = points::bound(model) {
         return (bound, Method::Points);
     }

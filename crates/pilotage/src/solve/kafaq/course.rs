@@ -8,7 +8,7 @@ use super::settings::{Rules, Settings};
 use super::task::{SOLVER, Task};
 use super::{Learned, Learning, printed, tested};
 use crate::error::Result;
-use crate::observe::Observer;
+use crate::progress::Progress;
 use crate::solve::learn::{Course, Owner, fitting};
 
 /// All that a run has to remember between two pieces of work.
@@ -52,7 +52,7 @@ impl Course for Task<'_> {
         })
     }
 
-    fn step(&self, state: &mut State, observer: &dyn Observer) -> Result<ControlFlow<()>> {
+    fn step(&self, state: &mut State, observer: &dyn Progress) -> Result<ControlFlow<()>> {
         Ok(match state {
             State::Tested(state) => state.advance(self, observer),
             State::Printed(state) => state.advance(self, observer),

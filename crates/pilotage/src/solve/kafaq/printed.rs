@@ -15,8 +15,8 @@ use super::settings::Settings;
 use super::task::{SOLVER, Task};
 use super::{Learned, Learning, Point, RegionValue};
 use crate::model::{ActionId, Then};
-use crate::observe::Observer;
 use crate::policy::{Automaton, Matching, Node, Place};
+use crate::progress::Progress;
 use crate::solve::learn::{Experience, boltzmann};
 
 /// Steps without a new region that count as convergence.
@@ -133,7 +133,7 @@ impl State {
     }
 
     /// SegmentSteadyLevel by the printed rules: an episode.
-    pub fn advance(&mut self, task: &Task<'_>, observer: &dyn Observer) -> ControlFlow<()> {
+    pub fn advance(&mut self, task: &Task<'_>, observer: &dyn Progress) -> ControlFlow<()> {
         if self.is_over(task) {
             return ControlFlow::Break(());
         }

@@ -9,7 +9,7 @@ use super::memory::{self, Kind, Memory};
 use super::steady::Steady;
 use super::task::Task;
 use super::{Learned, Learning, Point, RegionValue, commit, edges, tidy};
-use crate::observe::Observer;
+use crate::progress::Progress;
 use crate::solve::learn::{Experience, critical, undiscounted};
 
 /// All that a run has to remember between two epochs.
@@ -65,7 +65,7 @@ impl State {
     }
 
     /// An epoch, and what follows from it where it was the last of a memory.
-    pub fn advance(&mut self, task: &Task<'_>, observer: &dyn Observer) -> ControlFlow<()> {
+    pub fn advance(&mut self, task: &Task<'_>, observer: &dyn Progress) -> ControlFlow<()> {
         if let Some(steady) = self.learning.take() {
             self.learning = self.learn(task, steady, observer);
             if self.learning.is_none() {
@@ -83,7 +83,7 @@ impl State {
         &mut self,
         task: &Task<'_>,
         mut steady: Steady,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Option<Steady> {
         let limit = task.settings.epoch_limit as u64;
         observer.progress("epochs", steady.epochs() as u64, limit);
@@ -104,7 +104,7 @@ impl State {
     }
 
     /// Makes the automaton of a memory and keeps it if it earns surely more than the best so far.
-    fn conclude(&mut self, task: &Task<'_>, steady: Steady, observer: &dyn Observer) {
+    fn conclude(&mut self, task: &Task<'_>, steady: Steady, observer: &dyn Progress) {
         let (draft, trial, steps) = edges::compile(task, &steady);
         let (draft, trial, more_steps) = tidy::tidy(task, &steady, draft, trial);
         self.experience.samples += steps + more_steps;
@@ -165,7 +165,7 @@ impl State {
     }
 
     /// Learns the less certain levels of the best automaton.
-    fn commit(&mut self, task: &Task<'_>, observer: &dyn Observer) {
+    fn commit(&mut self, task: &Task<'_>, observer: &dyn Progress) {
         let Some(best) = &mut self.best else {
             return;
         };

@@ -105,7 +105,7 @@ impl Formulas {
         let carried = a * &from.covariance * a.transpose();
         let told = gain * &noise.sensor_noise * gain.transpose();
         let covariance = match (self.spread, known) {
-            (SpreadFormula::Exact, false) => carried + step.correction.spread(),
+            (SpreadFormula::Exact, false) => carried + step.correction.mean_covariance(),
             (SpreadFormula::Exact, true) => {
                 let keep = DMatrix::identity(a.nrows(), a.nrows()) - gain * h;
                 &keep * carried * keep.transpose() + told

@@ -7,15 +7,15 @@ use super::branches::Branches;
 use crate::belief::{Belief, BeliefMdp};
 use crate::error::{Error, Result};
 use crate::model::ActionId;
-use crate::observe::Observer;
 use crate::parallel;
 use crate::policy::{Automaton, Matching, Policy, first_best};
+use crate::progress::Progress;
 use crate::scenario::Scenario;
 use crate::simulate::{FilterAgent, run_episode};
 use crate::solve::compile::annotate;
 use crate::solve::rollout::check_runs;
 use crate::solve::settings::ensure;
-use crate::world::{Draws, ProblemWorld};
+use crate::world::{ProblemWorld, Streams};
 
 /// Most steps that are looked ahead: the search is as deep.
 const MOST_HORIZON: usize = 1000;
@@ -86,7 +86,7 @@ pub struct Generated {
 pub fn generate(
     mdp: &BeliefMdp,
     settings: &Settings,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<Generated> {
     let first = settings.search.horizon;
     check_horizons(first, settings.last_horizon)?;
@@ -161,7 +161,7 @@ fn run_once(planner: &Branches, settings: &Settings, run: u64) -> Vec<(Belief, A
     let filter = mdp.filter();
     let mut agent = FilterAgent::new(&filter, &thinker);
     let mut observation = vec![0.0; model.observation_dim()];
-    let mut draws = Draws::new(settings.seed, run);
+    let mut draws = Streams::new(settings.seed, run);
     let length = (horizon + 1).min(model.episode.length);
     run_episode(
         &mut ProblemWorld::new(&Scenario::assumed(model)),

@@ -14,7 +14,7 @@ use super::solver::{Found, Plan, Planner, Problem, refuse_if};
 use super::{Form, refusals};
 use crate::error::Result;
 use crate::model::Model;
-use crate::observe::Observer;
+use crate::progress::Progress;
 use branches::Branches;
 use formulas::Formulas;
 
@@ -85,7 +85,7 @@ impl Planner for Kbvi {
         accepts(model)
     }
 
-    fn plan(&self, problem: &Problem, observer: &dyn Observer) -> Result<Plan> {
+    fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
         let search = branches::Settings {
             horizon: self.first_horizon,
             group: self.group,

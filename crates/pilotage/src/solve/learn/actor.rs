@@ -3,7 +3,7 @@
 use crate::belief::{Belief, Filter};
 use crate::model::{ActionId, Model, Then};
 use crate::solve::learn::Worlds;
-use crate::world::{Draws, Step, World};
+use crate::world::{Step, Streams, World};
 
 /// A world and the belief about it.
 pub struct Actor<'a> {
@@ -27,13 +27,13 @@ impl<'a> Actor<'a> {
     }
 
     /// Starts an episode.
-    pub fn reset(&mut self, draws: &mut Draws) {
+    pub fn reset(&mut self, draws: &mut Streams) {
         self.world.reset(draws);
         self.filter.reset(&mut self.belief);
     }
 
     /// Takes an action and what it brings into the belief.
-    pub fn step(&mut self, action: ActionId, draws: &mut Draws) -> Step {
+    pub fn step(&mut self, action: ActionId, draws: &mut Streams) -> Step {
         let step = self.world.step(action, draws, &mut self.observation);
         match step.then {
             Then::Continue => {

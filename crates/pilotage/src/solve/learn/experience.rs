@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::random::{Rng, Role, stream};
-use crate::world::Draws;
+use crate::world::Streams;
 
 /// More episodes or steps than any run comes to.
 pub const MOST_COUNTED: u64 = 1 << 60;
@@ -31,11 +31,11 @@ impl Experience {
     }
 
     /// Random numbers of the next episode: for the world, and for exploration.
-    pub fn next_episode(&mut self, seed: u64) -> (Draws, Rng) {
+    pub fn next_episode(&mut self, seed: u64) -> (Streams, Rng) {
         let episode = self.episodes;
         self.episodes += 1;
         (
-            Draws::new(seed, episode),
+            Streams::new(seed, episode),
             stream(seed, episode, Role::Exploration),
         )
     }

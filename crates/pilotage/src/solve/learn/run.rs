@@ -8,8 +8,8 @@ use serde::de::DeserializeOwned;
 
 use super::checkpoint::Owner;
 use crate::error::{Error, Result};
-use crate::observe::Observer;
 use crate::policy::Automaton;
+use crate::progress::Progress;
 
 /// A learner with its task: how learning begins, how it goes on, and what was learned. All that changes is its state, so that a run can
 /// be stopped after any piece of work and gone on with.
@@ -43,7 +43,7 @@ pub trait Course {
     ///
     /// # Errors
     /// The learner's own.
-    fn step(&self, state: &mut Self::State, observer: &dyn Observer) -> Result<ControlFlow<()>>;
+    fn step(&self, state: &mut Self::State, observer: &dyn Progress) -> Result<ControlFlow<()>>;
 
     /// What was learned so far.
     fn learned(&self, state: &Self::State) -> Learned<Self::Learning>;
@@ -114,7 +114,7 @@ impl<C: Course> Run<C> {
     ///
     /// # Errors
     /// As [`Course::step`].
-    pub fn step(&mut self, observer: &dyn Observer) -> Result<ControlFlow<()>> {
+    pub fn step(&mut self, observer: &dyn Progress) -> Result<ControlFlow<()>> {
         self.course.step(&mut self.state, observer)
     }
 
@@ -134,7 +134,7 @@ impl<C: Course> Run<C> {
 pub fn learn<C: Course>(
     course: C,
     checkpoint: Option<&Path>,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<Learned<C::Learning>> {
     let mut run = match checkpoint.filter(|path| path.exists()) {
         Some(path) => Run::resume(course, path)?,

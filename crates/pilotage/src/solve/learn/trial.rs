@@ -4,10 +4,10 @@ use crate::belief::Belief;
 use crate::belief::gaussian::normal_cdf;
 use crate::model::Model;
 use crate::parallel;
-use crate::policy::{Automaton, Controller};
+use crate::policy::{Automaton, AutomatonRunner};
 use crate::simulate::{Agent, Episode, run_episode};
 use crate::solve::learn::Worlds;
-use crate::world::Draws;
+use crate::world::Streams;
 
 /// Trials are episodes of this number and up, which learning never reaches.
 const TRIALS: u64 = 1 << 40;
@@ -77,7 +77,7 @@ pub fn run_trial(
     episodes: usize,
     seed: u64,
 ) -> Trial {
-    let controller = Controller::new(automaton);
+    let controller = AutomatonRunner::new(automaton);
     let chunks = parallel::map(episodes.div_ceil(CHUNK), |chunk| {
         let mut world = worlds();
         let mut agent = Visitor {
@@ -88,7 +88,7 @@ pub fn run_trial(
         let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(episodes);
         let returns: Vec<Episode> = range
             .map(|episode| {
-                let mut draws = Draws::new(seed, TRIALS + episode as u64);
+                let mut draws = Streams::new(seed, TRIALS + episode as u64);
                 let limits = (model.episode.length, model.discount);
                 run_episode(
                     world.as_mut(),
@@ -119,7 +119,7 @@ pub fn run_trial(
 
 /// Runs an automaton and counts where it is.
 struct Visitor {
-    controller: Controller,
+    controller: AutomatonRunner,
     visits: Vec<f64>,
 }
 

@@ -2,17 +2,17 @@
 //!
 //! Costs count as negative reward: what is planned and what is earned are both `-cost`, so that more is better everywhere.
 //!
-//! A model that has a `[cost]` and pays no reward is solved exactly: a free control over a finite episode ([`Controller`]). For other
+//! A model that has a `[cost]` and pays no reward is solved exactly: a free control over a finite episode ([`LqgController`]). For other
 //! models it is a baseline: the action whose control is nearest to the command ([`NearestAction`]), which for two opposite forces
 //! is the sign of the command.
 //!
 //! # References
 //! K. J. Åström, *Introduction to Stochastic Control Theory*, 1970, chapter 8.
 
-mod control;
+mod controller;
 mod nearest;
 
-pub use control::Controller;
+pub use controller::LqgController;
 pub use nearest::{NearestAction, Weights};
 
 use nalgebra::DMatrix;
@@ -25,7 +25,7 @@ use super::solver::{Found, Plan, Planner, Problem, refuse_if};
 use crate::belief::kalman::symmetric;
 use crate::error::{Error, Result};
 use crate::model::{Interval, Model};
-use crate::observe::Observer;
+use crate::progress::Progress;
 
 /// Name of the solver in errors and policies.
 const SOLVER: &str = "lqg";
@@ -67,9 +67,9 @@ impl Planner for Lqg {
         refuse_if(SOLVER, model, use_of(model).err())
     }
 
-    fn plan(&self, problem: &Problem, _: &dyn Observer) -> Result<Plan> {
+    fn plan(&self, problem: &Problem, _: &dyn Progress) -> Result<Plan> {
         if !self.makes_automaton(problem.model()) {
-            let controller = Controller::new(problem.mdp())?;
+            let controller = LqgController::new(problem.mdp())?;
             return Ok(Plan {
                 value: Some(controller.planned_value()),
                 ..Plan::of(Found::Control(controller))

@@ -17,7 +17,7 @@ use crate::parallel;
 use crate::policy::Policy;
 use crate::random::{Rng, Role, stream, uniform};
 use crate::scenario::Scenario;
-use crate::world::{Draws, Noise, ProblemWorld, World};
+use crate::world::{Noise, ProblemWorld, Streams, World};
 
 /// Runs of beliefs from one kind of start.
 #[derive(Debug)]
@@ -25,7 +25,7 @@ pub struct Runs {
     /// Keeps the belief that is acted on.
     agent: Filter,
     /// Who is told where each run begins; nobody where the agent's own belief is all there is to know.
-    observer: Option<Observer>,
+    observer: Option<Progress>,
     /// What the belief that tells of failures is made of: of the observer, or else the agent.
     covariances: Vec<DMatrix<f64>>,
     alive: Region,
@@ -37,7 +37,7 @@ pub struct Runs {
 
 /// A filter that begins with certainty.
 #[derive(Debug)]
-struct Observer {
+struct Progress {
     filter: Filter,
     /// Starts are drawn here.
     scenario: Scenario,
@@ -80,14 +80,14 @@ impl Runs {
             start: vec![certain],
             ..model.clone()
         });
-        let observer = Observer {
+        let observer = Progress {
             filter: told.filter(),
             scenario: Scenario::assumed(model),
         };
         Self::new(&told, mdp.filter(), Some(observer))
     }
 
-    fn new(mdp: &BeliefMdp, agent: Filter, observer: Option<Observer>) -> Self {
+    fn new(mdp: &BeliefMdp, agent: Filter, observer: Option<Progress>) -> Self {
         let (model, levels) = (mdp.model(), mdp.levels());
         let actions = 0..model.actions.len();
         let h = &model.sensor.h;
@@ -196,7 +196,7 @@ impl Runs {
         let mut sensor = stream(sample.seed, run as u64, Role::Sensor);
         let mut fate = stream(sample.seed, run as u64, Role::World);
         let mut told = self.observer.as_ref().map(|observer| {
-            let draws = Draws::new(sample.seed, run as u64);
+            let draws = Streams::new(sample.seed, run as u64);
             Told::new(observer, draws)
         });
         let mut held = self.agent.initial();
@@ -240,14 +240,14 @@ impl Runs {
 
 /// An observer during a run.
 struct Told<'a> {
-    observer: &'a Observer,
+    observer: &'a Progress,
     belief: Belief,
     world: ProblemWorld,
-    draws: Draws,
+    draws: Streams,
 }
 
 impl<'a> Told<'a> {
-    fn new(observer: &'a Observer, draws: Draws) -> Self {
+    fn new(observer: &'a Progress, draws: Streams) -> Self {
         let mut told = Self {
             belief: observer.filter.initial(),
             world: ProblemWorld::new(&observer.scenario),

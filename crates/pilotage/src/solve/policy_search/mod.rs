@@ -31,8 +31,8 @@ use super::solver::{Plan, Planner, Problem, refuse_if};
 use crate::belief::BeliefMdp;
 use crate::error::Result;
 use crate::model::Model;
-use crate::observe::Observer;
 use crate::policy::Automaton;
+use crate::progress::Progress;
 use crate::solve::compile::annotate;
 use search::Search;
 
@@ -122,7 +122,7 @@ impl Planner for PolicySearch {
         refuse_if(SOLVER, model, refusal(&mdp, self.aim(model)))
     }
 
-    fn plan(&self, problem: &Problem, observer: &dyn Observer) -> Result<Plan> {
+    fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
         let automaton = search(problem.mdp(), self, problem.seed(), observer)?;
         let mut plan = Plan::automaton(automaton);
         if self.aim(problem.model()) == Objective::Survival {
@@ -144,7 +144,7 @@ pub fn search(
     mdp: &BeliefMdp,
     settings: &PolicySearch,
     seed: u64,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<Automaton> {
     settings.validate()?;
     let aim = settings.aim(mdp.model());

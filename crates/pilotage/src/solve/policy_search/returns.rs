@@ -6,8 +6,8 @@
 use super::refine::POPULATION;
 use super::search::{Numbers, Search};
 use crate::belief::Filter;
-use crate::observe::Silent;
 use crate::policy::Policy;
+use crate::progress::Silent;
 use crate::scenario::Scenario;
 use crate::simulate::{Options, evaluate};
 

@@ -7,15 +7,15 @@ use super::refine::{Phase, refine};
 use super::{Objective, PolicySearch, SOLVER, regulator};
 use crate::belief::{BeliefMdp, LevelId};
 use crate::error::Result;
-use crate::observe::Observer;
-use crate::policy::{Automaton, Controller};
+use crate::policy::{Automaton, AutomatonRunner};
+use crate::progress::Progress;
 use crate::solve::compile::planes::{self, Command, Group};
 
 /// A search under way.
 pub struct Search<'a> {
     pub mdp: &'a BeliefMdp,
     pub settings: &'a PolicySearch,
-    pub observer: &'a dyn Observer,
+    pub observer: &'a dyn Progress,
     pub groups: Vec<Group>,
     seed: u64,
     scale: Vec<f64>,
@@ -34,7 +34,7 @@ impl<'a> Search<'a> {
         mdp: &'a BeliefMdp,
         (settings, seed): (&'a PolicySearch, u64),
         aim: Objective,
-        observer: &'a dyn Observer,
+        observer: &'a dyn Progress,
     ) -> Result<(Self, Numbers)> {
         let command = regulator::command(mdp.model(), settings, aim)?;
         let groups = regulator::groups_of_levels(mdp, aim);
@@ -66,7 +66,7 @@ impl<'a> Search<'a> {
     /// width of the bounds, or 1.
     fn measured_scale(&self, command: &Command, aim: Objective) -> Vec<f64> {
         let commands = vec![command.clone(); self.groups.len()];
-        let policy = Controller::new(&self.compile(&commands));
+        let policy = AutomatonRunner::new(&self.compile(&commands));
         let target = regulator::target(self.mdp.model(), aim);
         let runs = Runs::steady(self.mdp, self.steady(), target.as_slice());
         let measured = runs.deviation(&policy, self.sample(100, 2000, 0));
@@ -105,8 +105,8 @@ impl<'a> Search<'a> {
     }
 
     /// The automaton of the numbers, laid out to be run.
-    pub fn controller(&self, numbers: &[DMatrix<f64>]) -> Controller {
-        Controller::new(&self.automaton(numbers))
+    pub fn controller(&self, numbers: &[DMatrix<f64>]) -> AutomatonRunner {
+        AutomatonRunner::new(&self.automaton(numbers))
     }
 
     /// So many runs of so many steps, which effort lengthens.

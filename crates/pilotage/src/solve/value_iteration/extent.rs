@@ -73,7 +73,8 @@ fn axis(mdp: &BeliefMdp, variable: usize, points: usize) -> Axis {
     if model.belief.walls == WallBelief::Clip {
         return Axis::new(bounds.low, bounds.high, points);
     }
-    let largest = |level: LevelId, class: usize| mdp.spread(level, class)[(variable, variable)];
+    let largest =
+        |level: LevelId, class: usize| mdp.mean_covariance(level, class)[(variable, variable)];
     let levels = 0..mdp.levels().len();
     let classes = mdp.levels().classes().len();
     let variance = levels

@@ -22,8 +22,8 @@ use super::extent::{axes, knows_map, mebibytes};
 use crate::belief::{Belief, BeliefMdp, LevelId};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Then};
-use crate::observe::Observer;
 use crate::policy::Policy;
+use crate::progress::Progress;
 use crate::solve::grid::{Axis, Grid, Interpolation, Settings, Smoother};
 use crate::solve::rollout;
 use crate::solve::walled::WalledSmoother;
@@ -56,7 +56,7 @@ pub struct GridPolicy {
 /// # Errors
 /// [`crate::Error::TooLarge`] and [`crate::Error::OutOfMemory`] where the grid does not fit the memory, [`crate::Error::Setting`] for settings out of range,
 /// [`crate::Error::Unsupported`] where the grid does not see what is paid, [`crate::Error::NotFinite`] where numbers grow beyond all bounds.
-pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> Result<GridPolicy> {
+pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Progress) -> Result<GridPolicy> {
     settings.validate()?;
     let mut policy = super::horizon::plan(mdp, settings, observer)?;
     if let Some(remark) = policy.strays() {
@@ -69,7 +69,7 @@ pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Observer) -> R
 pub(super) fn iterate(
     mdp: &BeliefMdp,
     settings: &Settings,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<GridPolicy> {
     let grid = Grid::new(axes(mdp, settings)?, Interpolation::Cubic);
     observer.note(&format!(
@@ -260,7 +260,7 @@ impl GridPolicy {
     pub(super) fn smoothers(&self, group: &[LevelId]) -> Vec<Vec<Average>> {
         let classes = 0..self.mdp.levels().classes().len();
         let of = |&level: &LevelId| {
-            let class = |class| self.average(&self.mdp.spread(level, class));
+            let class = |class| self.average(&self.mdp.mean_covariance(level, class));
             classes.clone().map(class).collect()
         };
         group.iter().map(of).collect()

@@ -8,8 +8,8 @@
 use super::grid_policy::{Average, Backup, GridPolicy, iterate};
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
-use crate::observe::Observer;
 use crate::policy::first_best;
+use crate::progress::Progress;
 use crate::solve::grid::Settings;
 
 /// Less than this share of the value at the start is nothing, wherever it is lost or forgotten.
@@ -22,7 +22,7 @@ const MATTERS: f64 = 5e-3;
 pub(super) fn plan(
     mdp: &BeliefMdp,
     settings: &Settings,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<GridPolicy> {
     let (model, length) = (mdp.model(), mdp.model().episode.length);
     if model.discount >= 1.0 {

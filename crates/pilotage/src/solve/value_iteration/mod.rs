@@ -18,7 +18,7 @@ use super::settings;
 use super::solver::{Plan, Planner, Problem, refuse_if};
 use crate::error::Result;
 use crate::model::Model;
-use crate::observe::Observer;
+use crate::progress::Progress;
 
 /// Name of the solver in errors and policies.
 const SOLVER: &str = "value-iteration";
@@ -51,7 +51,7 @@ impl Planner for ValueIteration {
         refuse_if(SOLVER, model, reason)
     }
 
-    fn plan(&self, problem: &Problem, observer: &dyn Observer) -> Result<Plan> {
+    fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
         let policy = solve(problem.mdp(), &self.grid, observer)?;
         // Levels that tell the time are others than the problem's.
         let mdp = policy.mdp().clone();

@@ -30,7 +30,7 @@ use super::levels::{Levels, Variances};
 use super::measure::common_measure;
 use super::step::restarts;
 use crate::model::{ActionId, ModeId, Then};
-use crate::observe::Observer;
+use crate::progress::Progress;
 use crate::solve::grid::Axis;
 use backup::Expected;
 pub(super) use lattice::towards;
@@ -58,7 +58,7 @@ pub(super) struct Found {
 pub(super) fn bound(
     frame: &Frame,
     points: Option<usize>,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<Found, String> {
     let effects = effects(frame)?;
     let starts: Vec<Variances> = frame
@@ -233,7 +233,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Backwards from the end of the episode.
-    fn solve(&mut self, observer: &dyn Observer) -> f64 {
+    fn solve(&mut self, observer: &dyn Progress) -> f64 {
         let model = self.frame.model;
         let last = model.episode.length - 1;
         let settled = self.reached.len();

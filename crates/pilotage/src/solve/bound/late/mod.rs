@@ -32,8 +32,8 @@ use super::frame::Frame;
 use super::law::Law;
 use super::step::{After, Before, after, before};
 use crate::model::{ActionId, ModeId, Then};
-use crate::observe::Observer;
 use crate::parallel;
+use crate::progress::Progress;
 use moves::{Moves, Place, moves};
 
 /// Most sweeps; an episode that is longer begins them with the ceiling.
@@ -77,7 +77,7 @@ struct Planner<'a> {
 pub(super) fn bound(
     frame: &Frame,
     points: Option<usize>,
-    observer: &dyn Observer,
+    observer: &dyn Progress,
 ) -> Result<f64, String> {
     if frame.walled && frame.model.map.is_some() {
         return Err("the walls of its map stop moves along both variables together".to_owned());
@@ -220,7 +220,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Backwards from the end of the episode.
-    fn solve(&mut self, observer: &dyn Observer) -> f64 {
+    fn solve(&mut self, observer: &dyn Progress) -> f64 {
         let length = self.frame.model.episode.length;
         let sweeps = length.min(MOST_SWEEPS);
         let mut ceiling = self.ceiling.within(length - sweeps);

@@ -9,7 +9,7 @@ const LANES: usize = 8;
 
 /// Runs an automaton: keeps its belief, matches its nodes.
 #[derive(Debug, Clone)]
-pub struct Controller {
+pub struct AutomatonRunner {
     filter: Filter,
     matching: Matching,
     coordinates: Option<Coordinates>,
@@ -27,7 +27,7 @@ pub struct Controller {
     scratch: Vec<f64>,
 }
 
-impl Controller {
+impl AutomatonRunner {
     /// Lays out an automaton. One without nodes does action 0 everywhere.
     pub fn new(automaton: &Automaton) -> Self {
         let filter = automaton.filter.clone();
@@ -180,7 +180,7 @@ fn least(mut lanes: [f64; LANES]) -> f64 {
     lanes[0]
 }
 
-impl Policy for Controller {
+impl Policy for AutomatonRunner {
     fn action(&self, belief: &Belief) -> ActionId {
         self.decide_at(belief).1
     }

@@ -8,17 +8,17 @@ use crate::belief::is_kept;
 use crate::belief::kalman::Correction;
 use crate::error::{Error, Result};
 use crate::model::{Model, QuadraticCost};
-use crate::observe::Observer;
+use crate::progress::Progress;
 use crate::scenario::{Scenario, Simulator, Walls};
 use crate::simulate::{Episode, Evaluation, Options, summarise};
-use crate::world::{Draws, Noise, ProblemWorld, World};
+use crate::world::{Noise, ProblemWorld, Streams, World};
 
 /// Most steps of an episode that gains are kept for.
 const MOST_STEPS: usize = 100_000;
 
 /// The gains of every step of an episode, of the control and of the filter.
 #[derive(Debug, Clone)]
-pub struct Controller {
+pub struct LqgController {
     model: Model,
     cost: QuadraticCost,
     /// Mean of the start belief, length `n`.
@@ -30,7 +30,7 @@ pub struct Controller {
     planned_value: f64,
 }
 
-impl Controller {
+impl LqgController {
     /// Solves a model with a quadratic cost over its episode. Its expected cost is
     ///
     /// ```text
@@ -117,7 +117,7 @@ impl Controller {
         &self,
         scenario: &Scenario,
         options: Options,
-        observer: &dyn Observer,
+        observer: &dyn Progress,
     ) -> Result<Evaluation> {
         let truth = &scenario.truth;
         let linear = truth.simulator == Simulator::Linear && truth.motion == Default::default();
@@ -136,7 +136,7 @@ impl Controller {
             let mut world = ProblemWorld::new(scenario);
             let noise = &noise;
             Box::new(move |episode| {
-                let mut draws = Draws::new(options.seed, episode);
+                let mut draws = Streams::new(options.seed, episode);
                 self.run(&mut world, noise, &mut draws)
             })
         }))
@@ -147,7 +147,7 @@ impl Controller {
         &self,
         world: &mut ProblemWorld,
         (motion_noise, sensor_noise): &(Noise, Noise),
-        draws: &mut Draws,
+        draws: &mut Streams,
     ) -> Episode {
         let (a, b, h) = (
             &self.model.motion.a,

@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 
 /// Watches an algorithm at work. Every method has a default that does nothing.
-pub trait Observer: Sync {
+pub trait Progress: Sync {
     /// A stage of the work has come so far; with nothing done it begins. `total` is 0 where it is not known. Reports of several
     /// threads may come out of order.
     fn progress(&self, stage: &'static str, done: u64, total: u64) {
@@ -31,4 +31,4 @@ pub trait Observer: Sync {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 
-impl Observer for Silent {}
+impl Progress for Silent {}
