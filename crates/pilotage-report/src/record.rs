@@ -143,7 +143,7 @@ fn believed(mdp: &BeliefMdp, agent: &dyn Agent) -> (usize, Vec<Hypothesis>) {
         mode: mode_name(mdp.model(), belief.mode),
         mean: belief.mean.clone(),
         // A covariance is the same row by row and column by column.
-        covariance: mdp.levels().covariance(belief.level).as_slice().to_vec(),
+        covariance: mdp.covariance(belief.stratum).as_slice().to_vec(),
     });
     (valid, drawn.collect())
 }

@@ -37,14 +37,14 @@ pub fn table_5_1(context: &Context<'_>) -> Result<Finding> {
         .iter()
         .map(|&(level, name, mean, action)| {
             let belief = Belief {
-                level,
+                stratum: level,
                 mode: 0,
                 mean: mean.to_vec(),
             };
             let ours = &model.actions[policy.action(&belief)].name;
             same += usize::from(ours == action);
             [
-                format!("{:.4}", mdp.levels().covariance(level)[(0, 0)]),
+                format!("{:.4}", mdp.covariance(level)[(0, 0)]),
                 name.to_owned(),
                 format!("({}, {})", mean[0], mean[1]),
                 action.to_owned(),

@@ -88,7 +88,7 @@ fn synthetic(nodes: usize, matching: Matching) -> Automaton {
                 upper: corner(0.1),
             },
         };
-        let levels = 0..=mdp.levels().len() - 1;
+        let levels = 0..=mdp.strata() - 1;
         automaton
             .nodes
             .push(Node::new(levels, 0, place, k % 2, None));

@@ -158,13 +158,13 @@ fn expected_rewards_after_the_move_are_averages_of_the_world() {
     let Scenario { mut model, truth } = scenario("cart-load-unload");
     model.state[0].bounds = Interval::new(-50.0, 50.0);
     let mdp = BeliefMdp::new(&model);
-    let level = mdp.levels().steady(mdp.start().level, 0).unwrap();
+    let level = mdp.levels().steady(mdp.start().stratum, 0).unwrap();
     for (mean, mode, action) in [(1.4, 0, 1), (2.3, 1, 0), (0.4, 0, 0)] {
         let mut start = model.start.clone();
         start[0].shape = StartShape::Normal;
         start[0].mode = mode;
         start[0].mean[0] = mean;
-        start[0].covariance = mdp.levels().covariance(level).clone();
+        start[0].covariance = mdp.covariance(level).clone();
         let there = Scenario {
             model: model.clone(),
             truth: Truth {
@@ -217,7 +217,7 @@ fn a_filter_switches_by_the_mean_before_or_after() {
         let filter = Filter::with_switches(&model, mdp.levels(), mdp.start(), vec![switch(when)]);
         let mut belief = Belief {
             mode: 0,
-            level: 0,
+            stratum: 0,
             mean: vec![1.5],
         };
         let mut modes = Vec::new();
@@ -240,10 +240,10 @@ fn predictions_stop_at_walls() {
     let model = scenario("basic").model;
     let mdp = BeliefMdp::new(&model);
     let filter = mdp.filter();
-    let level = mdp.levels().steady(mdp.start().level, 0).unwrap();
+    let level = mdp.levels().steady(mdp.start().stratum, 0).unwrap();
     let mut belief = Belief {
         mode: 0,
-        level,
+        stratum: level,
         mean: vec![3.9],
     };
     filter.update(&mut belief, 0, &[3.2], &mut [0.0]);

@@ -103,7 +103,7 @@ fn worlds_and_beliefs_agree_over_all_models() {
                 let start = mdp.start().clone();
                 let (low, high) = mdp.reward_range();
                 for action in 0..model.actions.len() {
-                    let (reward, outcomes) = mdp.step(mode, start.level, &start.mean, action);
+                    let (reward, outcomes) = mdp.step(mode, start.stratum, &start.mean, action);
                     let mut world = ProblemWorld::new(&Scenario::assumed(&model));
                     let mut observation = vec![0.0; model.observation_dim()];
                     let steps: Vec<(f64, bool, usize)> = (0..STEPS)

@@ -116,7 +116,7 @@ fn the_prediction_of_such_a_belief_stops_at_a_wall() {
     let model = mdp.model();
     let east = model.action_named("EAST").unwrap();
     let belief = Belief {
-        level: 0,
+        stratum: 0,
         mode: 0,
         mean: vec![1.5, 2.5],
     };
@@ -187,7 +187,7 @@ fn corridor_walls_is_the_corridor_with_another_belief() {
 #[test]
 fn the_unbounded_maze_has_three_levels_and_its_known_value() {
     let policy = unbounded();
-    assert_eq!(policy.mdp().levels().len(), 3);
+    assert_eq!(policy.mdp().strata(), 3);
     let value = policy.start_value();
     assert!((value - 0.26230).abs() < 0.001, "{value}");
     // The two directions are equally far from the goal: the value is symmetric about the diagonal through it.
@@ -196,7 +196,7 @@ fn the_unbounded_maze_has_three_levels_and_its_known_value() {
             let mean = vec![x, y];
             policy
                 .value(&Belief {
-                    level: 1,
+                    stratum: 1,
                     mode: 0,
                     mean,
                 })
@@ -276,12 +276,12 @@ fn the_way_from_the_start_of_the_maze_is_south_and_east() {
 fn away_from_the_goal_no_belief_goes_north_or_west() {
     let (policy, mdp) = (unbounded(), unbounded().mdp());
     let model = mdp.model();
-    for level in 0..mdp.levels().len() {
+    for level in 0..mdp.strata() {
         for i in 0..30 {
             for j in 0..30 {
                 let mean = vec![f64::from(i) * 0.1, 1.1 + f64::from(j) * 0.1];
                 let belief = Belief {
-                    level,
+                    stratum: level,
                     mode: 0,
                     mean,
                 };

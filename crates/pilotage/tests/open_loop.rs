@@ -81,7 +81,7 @@ fn by_formulas(mdp: &BeliefMdp, formulas: Formulas, mean: f64, horizon: usize) -
     let step = |(mean, outlook): &(f64, Outlook), action: usize| {
         let at = nalgebra::DVector::from_element(1, *mean);
         let reward = formulas.reward(mdp, 0, outlook, &at, action);
-        let class = mdp.levels().class_of(action);
+        let class = mdp.class_of(action);
         let next = (
             model.motion.a[0] * mean + model.displacement(action)[0],
             formulas.next_outlook(mdp, outlook, class, false),
@@ -89,7 +89,7 @@ fn by_formulas(mdp: &BeliefMdp, formulas: Formulas, mean: f64, horizon: usize) -
         let goes_on = model.actions[action].then == Then::Continue;
         (reward, goes_on.then_some(next))
     };
-    let outlook = Outlook::certain(mdp, mdp.start().level);
+    let outlook = Outlook::certain(mdp, mdp.start().stratum);
     let actions = model.actions.len();
     all_sequences(actions, model.discount, horizon, &(mean, outlook), &step)
 }

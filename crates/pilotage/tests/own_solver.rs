@@ -188,7 +188,7 @@ impl Course for Trials<'_> {
         let mdp = self.problem.mdp();
         let mut automaton = Automaton::new(mdp, "bandit", Matching::Nearest);
         let place = Place::Point(vec![0.0; mdp.model().state_dim()]);
-        let levels = 0..=mdp.levels().len() - 1;
+        let levels = 0..=mdp.strata() - 1;
         let action = best.map_or(0, |(action, _)| action);
         automaton
             .nodes

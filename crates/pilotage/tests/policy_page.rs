@@ -53,7 +53,7 @@ fn run(automaton: &Automaton, events: &[Event]) -> Vec<Row> {
     let row = |controller: &AutomatonRunner| {
         let (belief, (node, action)) = (controller.belief(), controller.decide());
         let row = Row {
-            level: belief.level,
+            level: belief.stratum,
             mode: belief.mode,
             mean: belief.mean.clone(),
             node,

@@ -1,6 +1,6 @@
-//! The filter as it runs: a belief is a level and a mean, its update two small matrix-vector products.
+//! The filter as it runs: a belief is an uncertainty level and a mean, its update two small matrix-vector products.
 
-use super::levels::{LevelGraph, LevelId};
+use super::levels::{LevelGraph, StratumId};
 use super::recall::Recall;
 use crate::model::{ActionId, Barriers, ModeId, Model, Region, WallBelief, When};
 
@@ -19,8 +19,8 @@ pub(crate) fn is_kept(mean: &[f64]) -> bool {
 /// What the agent knows: an uncertainty level, the mean at that level, and the hidden mode it takes to be the case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Belief {
-    /// Uncertainty level.
-    pub level: LevelId,
+    /// Everything else: for a linear model, the uncertainty level.
+    pub stratum: StratumId,
     /// Hidden mode (or memory).
     pub mode: ModeId,
     /// Mean, length `n`.
@@ -65,9 +65,9 @@ pub struct Filter {
     pub(crate) states: usize,
     pub(crate) readings: usize,
     /// Start level, mode and mean.
-    pub(crate) start: (LevelId, ModeId, Vec<f64>),
+    pub(crate) start: (StratumId, ModeId, Vec<f64>),
     /// Per level and action: next level.
-    pub(crate) next: Vec<LevelId>,
+    pub(crate) next: Vec<StratumId>,
     /// Per level and action: `K`, column by column.
     pub(crate) gains: Vec<f64>,
     /// `A`, row by row.
@@ -129,7 +129,7 @@ impl Filter {
         Self {
             states,
             readings,
-            start: (start.level, start.mode, start.mean.clone()),
+            start: (start.stratum, start.mode, start.mean.clone()),
             next,
             gains,
             motion: model.motion.a.transpose().as_slice().to_vec(),
@@ -152,14 +152,14 @@ impl Filter {
 
     /// The same filter with another start; its level is one of the same level graph.
     pub fn starting_at(mut self, start: &Belief) -> Self {
-        self.start = (start.level, start.mode, start.mean.clone());
+        self.start = (start.stratum, start.mode, start.mean.clone());
         self
     }
 
     /// The belief before anything was observed.
     pub fn initial(&self) -> Belief {
         Belief {
-            level: self.start.0,
+            stratum: self.start.0,
             mode: self.start.1,
             mean: self.start.2.clone(),
         }
@@ -167,7 +167,7 @@ impl Filter {
 
     /// Puts a belief back to the start without allocating.
     pub fn reset(&self, belief: &mut Belief) {
-        belief.level = self.start.0;
+        belief.stratum = self.start.0;
         belief.mode = self.start.1;
         belief.mean.copy_from_slice(&self.start.2);
     }
@@ -191,7 +191,7 @@ impl Filter {
         scratch: &mut [f64],
     ) {
         let before = self.switch(When::Before, belief, action);
-        let (n, edge) = (self.states, self.edge(belief.level, action));
+        let (n, edge) = (self.states, self.edge(belief.stratum, action));
         self.predict(belief, action, scratch);
         belief.mean.copy_from_slice(scratch);
         let size = n * self.readings;
@@ -208,7 +208,7 @@ impl Filter {
         if let Some(walls) = &self.walls {
             walls.confine(&mut belief.mean);
         }
-        belief.level = self.next[edge];
+        belief.stratum = self.next[edge];
         if let Some(recall) = &self.recall {
             belief.mode = recall.next(belief.mode, action, &belief.mean);
             return;
@@ -247,7 +247,7 @@ impl Filter {
     }
 
     /// Number of a step of the level graph: levels one after the other, each with its actions.
-    fn edge(&self, level: LevelId, action: ActionId) -> usize {
+    fn edge(&self, level: StratumId, action: ActionId) -> usize {
         level * self.actions + action
     }
 }

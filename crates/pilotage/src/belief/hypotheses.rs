@@ -215,7 +215,7 @@ impl Tracker {
             {
                 *value = observed - self.filter.sensed(&self.scratch, reading);
             }
-            let density = &self.densities[belief.level * self.actions + action];
+            let density = &self.densities[belief.stratum * self.actions + action];
             // Logarithms, because every density may be too small for a number.
             hypothesis.weight = hypothesis.weight.ln() + density.log(&self.innovation);
             best = best.max(hypothesis.weight);
@@ -258,7 +258,7 @@ impl Tracker {
 
     fn are_one(&self, i: usize, j: usize, policy: &dyn Policy) -> bool {
         let (a, b) = (&self.live[i].belief, &self.live[j].belief);
-        if (a.level, a.mode) != (b.level, b.mode) {
+        if (a.stratum, a.mode) != (b.stratum, b.mode) {
             return false;
         }
         match self.settings.merge {
@@ -272,7 +272,7 @@ impl Tracker {
 
     /// Distance of two means at the same level, in standard deviations.
     fn apart(&self, a: &Belief, b: &Belief) -> f64 {
-        let information = &self.information[a.level];
+        let information = &self.information[a.stratum];
         let between = |i: usize| a.mean[i] - b.mean[i];
         let n = a.mean.len();
         let squares: f64 = (0..n)

@@ -18,8 +18,9 @@ const SAME: f64 = 1e-9;
 /// Most numbers that all levels and their steps may be.
 const MOST_NUMBERS: usize = 1 << 26;
 
-/// Index of an uncertainty level.
-pub type LevelId = usize;
+/// Index of a stratum: everything about a belief but its mode and its mean, one of finitely many. For a linear model it is an uncertainty
+/// level.
+pub type StratumId = usize;
 /// Index of a noise class.
 pub type ClassId = usize;
 
@@ -36,7 +37,7 @@ pub struct NoiseClass {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelStep {
     /// The level it leads to.
-    pub next: LevelId,
+    pub next: StratumId,
     /// Whether there was no room for the level it should lead to, and `next` is the closest there is.
     pub cut: bool,
     /// Gain, innovation covariance and the rest of the step.
@@ -62,7 +63,7 @@ pub struct LevelGraph {
     class_of_action: Vec<ClassId>,
     /// By level, then class.
     steps: Vec<Vec<LevelStep>>,
-    starts: Vec<LevelId>,
+    starts: Vec<StratumId>,
     /// Whether every chain closed before the limit of levels.
     converged: bool,
     /// Most levels there is room for.
@@ -146,7 +147,7 @@ impl LevelGraph {
         }
     }
 
-    fn explore(&mut self, model: &Model, level: LevelId, class: ClassId) -> LevelStep {
+    fn explore(&mut self, model: &Model, level: StratumId, class: ClassId) -> LevelStep {
         let NoiseClass {
             motion_noise,
             sensor_noise,
@@ -170,10 +171,10 @@ impl LevelGraph {
     fn lead(
         &mut self,
         model: &Model,
-        level: LevelId,
+        level: StratumId,
         class: ClassId,
         covariance: &DMatrix<f64>,
-    ) -> (LevelId, bool) {
+    ) -> (StratumId, bool) {
         if self.is_over(level) {
             return (level, false);
         }
@@ -193,7 +194,7 @@ impl LevelGraph {
     }
 
     /// The steady level of a class whose covariance no longer changes by more than the tolerance.
-    fn settle(&mut self, model: &Model, class: ClassId, covariance: &DMatrix<f64>) -> LevelId {
+    fn settle(&mut self, model: &Model, class: ClassId, covariance: &DMatrix<f64>) -> StratumId {
         let NoiseClass {
             motion_noise,
             sensor_noise,
@@ -207,7 +208,7 @@ impl LevelGraph {
         steady
     }
 
-    fn add(&mut self, covariance: DMatrix<f64>, time: usize) -> LevelId {
+    fn add(&mut self, covariance: DMatrix<f64>, time: usize) -> StratumId {
         self.nearby
             .insert(&covariance, time, self.covariances.len());
         if self.held.len() <= time {
@@ -232,11 +233,11 @@ impl LevelGraph {
     }
 
     /// The level closest to a covariance among those held at a time.
-    fn closest(&self, covariance: &DMatrix<f64>, time: usize) -> Option<LevelId> {
+    fn closest(&self, covariance: &DMatrix<f64>, time: usize) -> Option<StratumId> {
         self.nearest(covariance, f64::INFINITY, time)
     }
 
-    fn nearest(&self, covariance: &DMatrix<f64>, tolerance: f64, time: usize) -> Option<LevelId> {
+    fn nearest(&self, covariance: &DMatrix<f64>, tolerance: f64, time: usize) -> Option<StratumId> {
         self.nearby
             .nearest(&self.covariances, covariance, tolerance, time)
     }
@@ -252,24 +253,24 @@ impl LevelGraph {
     }
 
     /// Covariance of a level, `n x n`.
-    pub fn covariance(&self, level: LevelId) -> &DMatrix<f64> {
+    pub fn covariance(&self, level: StratumId) -> &DMatrix<f64> {
         &self.covariances[level]
     }
 
     /// The step of an episode at which a level is held; where nothing changes with the step any more, the first of those steps.
-    pub fn time(&self, level: LevelId) -> usize {
+    pub fn time(&self, level: StratumId) -> usize {
         self.times[level]
     }
 
     /// Whether an episode is over at a level.
-    pub fn is_over(&self, level: LevelId) -> bool {
+    pub fn is_over(&self, level: StratumId) -> bool {
         self.ends && self.times[level] == self.clock
     }
 
     /// Covariance of the next mean around its prediction after a step of a class: `K S K'`. Where levels were cut, what the step
     /// would leave of the uncertainty is not what the level it leads to has, and the mean moves by the difference that is true of these
     /// two, `P- - P`, so that looking is not worth more than it tells.
-    pub fn mean_covariance(&self, level: LevelId, class: ClassId) -> DMatrix<f64> {
+    pub fn mean_covariance(&self, level: StratumId, class: ClassId) -> DMatrix<f64> {
         let step = &self.steps[level][class];
         if !step.cut {
             return step.correction.mean_covariance();
@@ -289,12 +290,12 @@ impl LevelGraph {
     }
 
     /// What one step of a class does at a level.
-    pub fn step(&self, level: LevelId, class: ClassId) -> &LevelStep {
+    pub fn step(&self, level: StratumId, class: ClassId) -> &LevelStep {
         &self.steps[level][class]
     }
 
     /// Levels of the start covariances, in the order given.
-    pub fn starts(&self) -> &[LevelId] {
+    pub fn starts(&self) -> &[StratumId] {
         &self.starts
     }
 
@@ -342,7 +343,7 @@ impl LevelGraph {
         Ok(())
     }
 
-    fn check_level(&self, model: &Model, level: LevelId) -> Result<()> {
+    fn check_level(&self, model: &Model, level: StratumId) -> Result<()> {
         /// Share of the largest entry that rounding may make negative.
         const ROUNDING: f64 = 1e-9;
         let covariance = &self.covariances[level];
@@ -400,7 +401,7 @@ impl LevelGraph {
     }
 
     /// The level that repeats itself under a class, followed from a start; `None` where levels run in a circle or were cut.
-    pub fn steady(&self, start: LevelId, class: ClassId) -> Option<LevelId> {
+    pub fn steady(&self, start: StratumId, class: ClassId) -> Option<StratumId> {
         let mut level = start;
         for _ in 0..=self.len() {
             let next = self.steps[level][class].next;

@@ -8,8 +8,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::filter::{Belief, Filter};
 use super::gaussian::{interval_probability, region_probability};
-use super::levels::{LevelGraph, LevelId};
+use super::levels::{ClassId, LevelGraph, StratumId};
 use super::mixture::Mixture;
+use crate::error::Result;
 use crate::model::{
     ActionId, Barriers, Effect, HypothesisBelief, Interval, Map, ModeId, Model, Outcome, Region,
     Then, WallBelief, When, apart,
@@ -72,7 +73,14 @@ impl BeliefMdp {
             .zip(levels.starts())
             .map(|(&(weight, mode, mean, _), &level)| {
                 let mean = mean.as_slice().to_vec();
-                (weight, Belief { level, mode, mean })
+                (
+                    weight,
+                    Belief {
+                        stratum: level,
+                        mode,
+                        mean,
+                    },
+                )
             })
             .collect();
         let mixture = Mixture::of(model, &levels, &mean);
@@ -121,6 +129,52 @@ impl BeliefMdp {
         &self.levels
     }
 
+    /// Number of strata, at least 1.
+    pub fn strata(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// Covariance of the beliefs of a stratum, `n x n`.
+    pub fn covariance(&self, stratum: StratumId) -> &DMatrix<f64> {
+        self.levels.covariance(stratum)
+    }
+
+    /// Whether an episode is over at a stratum.
+    pub fn is_over(&self, stratum: StratumId) -> bool {
+        self.levels.is_over(stratum)
+    }
+
+    /// Number of noise classes: actions of one lead from every stratum to the same one, with means that spread alike.
+    pub fn classes(&self) -> usize {
+        self.levels.classes().len()
+    }
+
+    /// Noise class of an action.
+    pub fn class_of(&self, action: ActionId) -> ClassId {
+        self.levels.class_of(action)
+    }
+
+    /// The stratum after a step of a class that was sensed.
+    pub fn next(&self, stratum: StratumId, class: ClassId) -> StratumId {
+        self.levels.step(stratum, class).next
+    }
+
+    /// Checks that every belief is one, see [`LevelGraph::check`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check(&self) -> Result<()> {
+        self.levels.check(&self.model)
+    }
+
+    /// Checks that no uncertainty grows for ever, see [`LevelGraph::check_bounded`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check_bounded(&self) -> Result<()> {
+        self.levels.check_bounded(&self.model)
+    }
+
     /// The belief at the start; the first one where hypotheses are tracked.
     pub fn start(&self) -> &Belief {
         &self.starts[0].1
@@ -156,7 +210,7 @@ impl BeliefMdp {
     }
 
     /// Weight and mean of each start hypothesis at a belief, where one filter keeps them all.
-    pub fn hypotheses(&self, level: LevelId, mean: &[f64]) -> Option<Vec<(f64, DVector<f64>)>> {
+    pub fn hypotheses(&self, level: StratumId, mean: &[f64]) -> Option<Vec<(f64, DVector<f64>)>> {
         let mixture = self.mixture.as_ref()?;
         Some(mixture.hypotheses(level, mean))
     }
@@ -168,13 +222,13 @@ impl BeliefMdp {
     }
 
     /// What an action can do in a mode at a level, with regions as the belief reads them.
-    pub fn effects(&self, mode: ModeId, level: LevelId, action: ActionId) -> &[Effect] {
+    pub fn effects(&self, mode: ModeId, level: StratumId, action: ActionId) -> &[Effect] {
         let time = self.levels.time(level).min(self.effects.len() - 1);
         &self.effects[time][mode][action]
     }
 
     /// Probability that the true state lies in the region (Eq. 5.2, exact).
-    pub fn probability(&self, level: LevelId, mean: &[f64], region: &Region) -> f64 {
+    pub fn probability(&self, level: StratumId, mean: &[f64], region: &Region) -> f64 {
         match self.reading {
             Reading::Clipped => beyond_walls(&self.model, region)
                 .map_or(0.0, |region| self.mass(level, mean, &region)),
@@ -183,7 +237,7 @@ impl BeliefMdp {
     }
 
     /// As [`BeliefMdp::probability`], for a region as the belief reads it.
-    fn mass(&self, level: LevelId, mean: &[f64], region: &Region) -> f64 {
+    fn mass(&self, level: StratumId, mean: &[f64], region: &Region) -> f64 {
         self.averaged(level, mean, |mean, covariance| {
             region_probability(mean, covariance, region)
         })
@@ -193,7 +247,7 @@ impl BeliefMdp {
     /// predicts it, N(A m + B u, P-).
     fn holds(
         &self,
-        level: LevelId,
+        level: StratumId,
         mean: &[f64],
         action: ActionId,
         region: &Region,
@@ -219,7 +273,7 @@ impl BeliefMdp {
     }
 
     /// Probability that the true state is within what [`crate::model::Episode::alive`] allows.
-    pub fn alive(&self, level: LevelId, mean: &[f64]) -> f64 {
+    pub fn alive(&self, level: StratumId, mean: &[f64]) -> f64 {
         let alive = &self.model.episode.alive;
         if alive.sides.is_empty() {
             return 1.0;
@@ -231,7 +285,7 @@ impl BeliefMdp {
     /// does not know it.
     ///
     /// Counting the probability of being outside afresh at every step would count the same error of the estimate over and over.
-    pub fn survival(&self, level: LevelId, mean: &[f64], action: ActionId) -> Survival {
+    pub fn survival(&self, level: StratumId, mean: &[f64], action: ActionId) -> Survival {
         let alive = &self.model.episode.alive;
         if alive.sides.is_empty() || self.model.actions[action].then != Then::Continue {
             return Survival::SURE;
@@ -255,7 +309,7 @@ impl BeliefMdp {
     pub fn step(
         &self,
         mode: ModeId,
-        level: LevelId,
+        level: StratumId,
         mean: &[f64],
         action: ActionId,
     ) -> (f64, Vec<Outcome>) {
@@ -284,14 +338,14 @@ impl BeliefMdp {
     }
 
     /// Expected cost of a step, as a negative reward.
-    fn running_cost(&self, level: LevelId, mean: &[f64], action: ActionId) -> f64 {
+    fn running_cost(&self, level: StratumId, mean: &[f64], action: ActionId) -> f64 {
         self.averaged(level, mean, |mean, covariance| {
             self.model.running_cost(mean, Some(covariance), action)
         })
     }
 
     /// Expected cost of ending an episode, as a negative reward.
-    pub fn terminal_cost(&self, level: LevelId, mean: &[f64]) -> f64 {
+    pub fn terminal_cost(&self, level: StratumId, mean: &[f64]) -> f64 {
         self.averaged(level, mean, |mean, covariance| {
             self.model.terminal_cost(mean, Some(covariance))
         })
@@ -300,7 +354,7 @@ impl BeliefMdp {
     /// Average of something that is known of a Gaussian.
     fn averaged(
         &self,
-        level: LevelId,
+        level: StratumId,
         mean: &[f64],
         of: impl Fn(&[f64], &DMatrix<f64>) -> f64,
     ) -> f64 {
@@ -318,7 +372,7 @@ impl BeliefMdp {
     }
 
     /// Expected immediate reward `r(b, a)`, see [`BeliefMdp::step`].
-    pub fn reward(&self, mode: ModeId, level: LevelId, mean: &[f64], action: ActionId) -> f64 {
+    pub fn reward(&self, mode: ModeId, level: StratumId, mean: &[f64], action: ActionId) -> f64 {
         self.step(mode, level, mean, action).0
     }
 
@@ -326,7 +380,7 @@ impl BeliefMdp {
     pub fn outcomes(
         &self,
         mode: ModeId,
-        level: LevelId,
+        level: StratumId,
         mean: &[f64],
         action: ActionId,
     ) -> Vec<Outcome> {
@@ -337,7 +391,7 @@ impl BeliefMdp {
     /// agent observe. The innovation's own noise has covariance [`BeliefMdp::mean_covariance`] around it.
     pub fn centres(
         &self,
-        level: LevelId,
+        level: StratumId,
         mean: &[f64],
         action: ActionId,
     ) -> Vec<(f64, DVector<f64>)> {
@@ -356,7 +410,7 @@ impl BeliefMdp {
 
     /// Covariance of the next mean around its centre after an action of this class: `K S K'` (Eq. 5.6, corrected); for a mixture
     /// with the `S` of each of its hypotheses.
-    pub fn mean_covariance(&self, level: LevelId, class: usize) -> DMatrix<f64> {
+    pub fn mean_covariance(&self, level: StratumId, class: usize) -> DMatrix<f64> {
         let step = self.levels.step(level, class);
         match self.read_as_mixture() {
             None => self.levels.mean_covariance(level, class),

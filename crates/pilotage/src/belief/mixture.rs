@@ -13,7 +13,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::levels::{LevelGraph, LevelId};
+use super::levels::{LevelGraph, StratumId};
 use crate::model::{Model, StartHypothesis};
 
 /// The hypotheses of a start as functions of level and mean.
@@ -66,12 +66,12 @@ impl Mixture {
     }
 
     /// Covariance of every hypothesis at a level, `n x n`; 0 where they are points.
-    pub fn covariance(&self, level: LevelId) -> &DMatrix<f64> {
+    pub fn covariance(&self, level: StratumId) -> &DMatrix<f64> {
         &self.learned[level].covariance
     }
 
     /// Weight and mean of each hypothesis.
-    pub fn hypotheses(&self, level: LevelId, mean: &[f64]) -> Vec<(f64, DVector<f64>)> {
+    pub fn hypotheses(&self, level: StratumId, mean: &[f64]) -> Vec<(f64, DVector<f64>)> {
         let Learned {
             information,
             gained,

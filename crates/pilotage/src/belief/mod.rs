@@ -15,6 +15,6 @@ pub(crate) use filter::is_kept;
 pub use filter::{Belief, Filter, LARGEST, Switch};
 pub use hypotheses::{Hypothesis, Merge, Tracker, Tracking};
 pub use kalman::{Correction, KalmanFilter};
-pub use levels::{ClassId, LevelGraph, LevelId};
+pub use levels::{ClassId, LevelGraph, StratumId};
 pub use mdp::{BeliefMdp, Survival};
 pub use recall::{ClusterId, Clusters, Recall};

@@ -106,7 +106,7 @@ impl AutomatonRunner {
     fn decide_at(&self, belief: &Belief) -> (NodeId, ActionId) {
         let (from, to) = self
             .ranges
-            .get(belief.mode * self.levels + belief.level)
+            .get(belief.mode * self.levels + belief.stratum)
             .copied()
             .unwrap_or((0, 0));
         if from == to {

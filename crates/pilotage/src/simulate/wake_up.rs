@@ -257,7 +257,7 @@ pub fn measure(
 ) -> Result<WakeUp> {
     let goals = mdp.model().goals();
     check(mdp, &goals, settings)?;
-    mdp.levels().check(mdp.model())?;
+    mdp.check()?;
     let agent = WakeUpAgent::new(mdp, policy, settings.tracking, settings.choice)?;
     let told: Vec<Filter> = mdp
         .starts()

@@ -208,7 +208,7 @@ impl StateMdp {
             }
         });
         let future = parallel::map(modes * actions, |index| {
-            let class = self.belief_mdp.levels().class_of(index % actions);
+            let class = self.belief_mdp.class_of(index % actions);
             let look_up = |(state, entry): (usize, &Entry)| match &entry.next {
                 Next::End => 0.0,
                 Next::Restart => restart,
@@ -307,7 +307,7 @@ fn space(belief_mdp: &BeliefMdp, settings: &Settings) -> Result<Space> {
     let model = belief_mdp.model();
     let start = belief_mdp.start();
     if model.belief.hypotheses == HypothesisBelief::Collapse
-        && let Some(points) = belief_mdp.hypotheses(start.level, &start.mean)
+        && let Some(points) = belief_mdp.hypotheses(start.stratum, &start.mean)
     {
         let points = points.into_iter().map(|(_, point)| point.clone());
         return Ok(Space::Points(points.collect()));
@@ -320,8 +320,7 @@ fn space(belief_mdp: &BeliefMdp, settings: &Settings) -> Result<Space> {
     });
     // `V` and what it is smoothed to, `F` as it is and averaged over every level, and the entries.
     let tables = model.modes.len()
-        * (1 + belief_mdp.levels().classes().len()
-            + model.actions.len() * (1 + belief_mdp.levels().len() + 6 + n));
+        * (1 + belief_mdp.classes() + model.actions.len() * (1 + belief_mdp.strata() + 6 + n));
     let total = (points as u64).saturating_pow(n as u32);
     let numbers = total.saturating_mul(tables as u64);
     let mebibytes = numbers.saturating_mul(8) >> 20;

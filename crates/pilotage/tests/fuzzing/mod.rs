@@ -117,10 +117,10 @@ fn models() -> Reader {
             model.episode.length = model.episode.length.min(5);
             let model = &scenario.model;
             let mdp = BeliefMdp::new(model);
-            if mdp.levels().check(model).is_err() {
+            if mdp.check().is_err() {
                 return false;
             }
-            let _ = mdp.levels().check_bounded(model);
+            let _ = mdp.check_bounded();
             for entry in registry.entries() {
                 let _ = entry.accepts(model);
             }

@@ -219,7 +219,7 @@ impl Steady {
             let temperature = self.temperature * experience.reward_range();
             let explore = task.settings.explore;
             let action = boltzmann(self.table.row(row), temperature, explore, &mut exploration);
-            let at_steady = actor.belief.level == task.steady();
+            let at_steady = actor.belief.stratum == task.steady();
             let step = actor.step(action, &mut draws);
             experience.collect(step.reward);
             earned.steps += 1;

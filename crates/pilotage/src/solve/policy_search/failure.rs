@@ -11,7 +11,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::belief::gaussian::exit_probability;
-use crate::belief::{Belief, BeliefMdp, Filter, LevelId};
+use crate::belief::{Belief, BeliefMdp, Filter, StratumId};
 use crate::model::{Interval, Model, Region, StartHypothesis, StartShape};
 use crate::parallel;
 use crate::policy::Policy;
@@ -56,9 +56,9 @@ pub struct Sample {
 
 impl Runs {
     /// Runs that begin and stay at a level that repeats itself, from a mean (length `n`).
-    pub fn steady(mdp: &BeliefMdp, level: LevelId, mean: &[f64]) -> Self {
+    pub fn steady(mdp: &BeliefMdp, level: StratumId, mean: &[f64]) -> Self {
         let start = Belief {
-            level,
+            stratum: level,
             mode: mdp.start().mode,
             mean: mean.to_vec(),
         };
@@ -214,7 +214,7 @@ impl Runs {
             }
             let knows = told.as_ref().map_or(&held, |told| &told.belief);
             let failure =
-                exit_probability(&knows.mean, &self.covariances[knows.level], &self.alive);
+                exit_probability(&knows.mean, &self.covariances[knows.stratum], &self.alive);
             if visit(&knows.mean, failure, &mut fate) {
                 self.agent.reset(&mut held);
                 if let Some(told) = &mut told {
@@ -234,7 +234,7 @@ impl Runs {
         {
             *reading = pushed + row.iter().zip(&from.mean).map(|(a, m)| a * m).sum::<f64>();
         }
-        self.innovations[from.level][action].add_to(observation, rng);
+        self.innovations[from.stratum][action].add_to(observation, rng);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Where the grid of value iteration lies, how fine it is and how much memory it takes.
 
 use super::SOLVER;
-use crate::belief::{BeliefMdp, LevelId};
+use crate::belief::{BeliefMdp, StratumId};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::{Map, Model, Region, WallBelief};
@@ -73,12 +73,13 @@ fn axis(mdp: &BeliefMdp, variable: usize, points: usize) -> Axis {
     if model.belief.walls == WallBelief::Clip {
         return Axis::new(bounds.low, bounds.high, points);
     }
-    let largest =
-        |level: LevelId, class: usize| mdp.mean_covariance(level, class)[(variable, variable)];
-    let levels = 0..mdp.levels().len();
-    let classes = mdp.levels().classes().len();
-    let variance = levels
-        .flat_map(|level| (0..classes).map(move |class| (level, class)))
+    let largest = |stratum: StratumId, class: usize| {
+        mdp.mean_covariance(stratum, class)[(variable, variable)]
+    };
+    let strata = 0..mdp.strata();
+    let classes = mdp.classes();
+    let variance = strata
+        .flat_map(|stratum| (0..classes).map(move |class| (stratum, class)))
         .map(|(l, c)| largest(l, c))
         .fold(0.0, f64::max);
     let axis = Axis::around(bounds, variance.sqrt(), points);
@@ -158,8 +159,8 @@ const COARSE: f64 = 1.0;
 /// How far apart points may be along a variable: the expected reward of a belief changes over a length of the narrowest place where
 /// something is paid, which `points` of them resolve, or over the belief's own width where that is more, which two do.
 fn scale(mdp: &BeliefMdp, variable: usize, points: f64) -> f64 {
-    let variance = |level| mdp.levels().covariance(level)[(variable, variable)];
-    let least = (0..mdp.levels().len())
+    let variance = |stratum| mdp.covariance(stratum)[(variable, variable)];
+    let least = (0..mdp.strata())
         .map(variance)
         .fold(f64::INFINITY, f64::min);
     let widths = paid_places(mdp.model()).map(|(_, region)| region.side(variable).width());
@@ -210,9 +211,9 @@ fn resolves(mdp: &BeliefMdp, axes: &[Axis]) -> Result<()> {
 
 /// Functions kept on the grid: values, expectations and probabilities of failing.
 fn functions(mdp: &BeliefMdp) -> u64 {
-    let (levels, classes) = (mdp.levels().len(), mdp.levels().classes().len());
+    let (strata, classes) = (mdp.strata(), mdp.classes());
     let limits = usize::from(!mdp.model().episode.alive.sides.is_empty());
-    (levels * (mdp.model().modes.len() * (1 + classes) + limits)) as u64
+    (strata * (mdp.model().modes.len() * (1 + classes) + limits)) as u64
 }
 
 /// Memory for the functions on a grid of so many points.
