@@ -101,10 +101,9 @@ pub fn figures_5_3_and_5_4(context: &Context<'_>) -> Result<Finding> {
     let samples = context.either(400_000, 40_000);
     let filter = mdp.filter();
     let deviation = |matrix: &DMatrix<f64>| matrix[(0, 0)].sqrt();
-    let noise = &mdp.levels().classes()[class];
     let (moved, sensed) = (
-        deviation(&noise.motion_noise),
-        deviation(&noise.sensor_noise),
+        deviation(model.motion_noise(east, 0)),
+        deviation(model.sensor_noise(east, 0)),
     );
     let spread = deviation(mdp.covariance(start.stratum));
     let mut rng = stream(context.seed, 0, Role::World);

@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used)]
 
 use nalgebra::DVector;
-use pilotage::belief::{Belief, BeliefMdp, Filter, Switch};
-use pilotage::model::{Interval, Region, StartShape, Then, When};
+use pilotage::belief::{Belief, BeliefMdp, Filter, Reading};
+use pilotage::model::{Interval, Region, StartShape, Steps, Switch, Then, When};
 use pilotage::scenario::{self, Scenario, Truth};
-use pilotage::world::{ProblemWorld, Streams, World};
+use pilotage::world::{Observation, ProblemWorld, Streams, World};
 
 fn scenario(name: &str) -> Scenario {
     scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
@@ -36,10 +36,11 @@ fn walk(scenario: &Scenario, plan: &[&str]) -> Vec<(f64, Vec<f64>, usize)> {
     let mut world = ProblemWorld::new(scenario);
     let mut draws = Streams::new(1, 0);
     world.reset(&mut draws);
-    let mut sensed = vec![0.0; model.observation_dim()];
+    let mut sensed = Observation::new(model.observation_dim());
     let step = |name: &&str| {
         let step = world.step(model.action_named(name).unwrap(), &mut draws, &mut sensed);
-        assert_eq!(sensed, world.state(), "noiseless sensors show the place");
+        let shown = Reading::Values(world.state());
+        assert_eq!(sensed.reading(), shown, "noiseless sensors show the place");
         (step.reward, world.state().to_vec(), world.mode())
     };
     plan.iter().map(step).collect()
@@ -121,7 +122,7 @@ fn the_shuttle_moves_the_way_it_faces_and_docks_backwards() {
         [0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 0.0, -10.0, 10.0]
     );
     // The agent's own model has no idea of it.
-    assert_eq!(scenario.model.displacement(0)[0], 0.0);
+    assert_eq!(scenario.model.displacement(0, 0)[0], 0.0);
 }
 
 #[test]
@@ -178,7 +179,10 @@ fn expected_rewards_after_the_move_are_averages_of_the_world() {
         for episode in 0..count {
             let mut draws = Streams::new(11, episode);
             world.reset(&mut draws);
-            paid += world.step(action, &mut draws, &mut [0.0]).reward / count as f64;
+            paid += world
+                .step(action, &mut draws, &mut Observation::new(1))
+                .reward
+                / count as f64;
             switched += f64::from(world.mode() != mode) / count as f64;
         }
         let expected = mdp.reward(mode, level, &[mean], action);
@@ -211,6 +215,7 @@ fn a_filter_switches_by_the_mean_before_or_after() {
         mode: Some(0),
         region: Region::new(vec![(0, Interval::new(0.0, 1.0))]),
         when,
+        steps: Steps::ALL,
         becomes: 1,
     };
     let modes = |when: When| -> Vec<usize> {

@@ -217,12 +217,11 @@ fn levels_stay_near_the_true_covariance() {
     for time in 0..10_000_usize {
         let action = (time * time / 7 + time / 3) % 3;
         let class = graph.class_of(action);
-        let noise = &graph.classes()[class];
         exact = Correction::new(
             &model.motion.a,
-            &noise.motion_noise,
+            model.motion_noise(action, 0),
             &model.sensor.h,
-            &noise.sensor_noise,
+            model.sensor_noise(action, 0),
             &exact,
         )
         .covariance;

@@ -11,7 +11,7 @@ use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Options, evaluate};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::value_iteration::{self, GridPolicy};
-use pilotage::world::{ProblemWorld, Streams, World};
+use pilotage::world::{Observation, ProblemWorld, Streams, World};
 
 fn find(name: &str) -> Scenario {
     scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
@@ -39,7 +39,7 @@ fn automaton(mdp: &BeliefMdp, policy: &GridPolicy, episodes: usize) -> Automaton
 fn walk(scenario: &Scenario, seed: u64, plan: &[usize]) -> Vec<Vec<f64>> {
     let mut world = ProblemWorld::new(scenario);
     let mut draws = Streams::new(seed, 0);
-    let mut observation = vec![0.0; scenario.model.observation_dim()];
+    let mut observation = Observation::new(scenario.model.observation_dim());
     world.reset(&mut draws);
     let mut way = vec![world.state().to_vec()];
     for &action in plan {

@@ -24,15 +24,6 @@ pub type StratumId = usize;
 /// Index of a noise class.
 pub type ClassId = usize;
 
-/// Actions that disturb state and sensor in the same way.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NoiseClass {
-    /// Process noise covariance, `n x n`.
-    pub motion_noise: DMatrix<f64>,
-    /// Measurement noise covariance, `m x m`.
-    pub sensor_noise: DMatrix<f64>,
-}
-
 /// One step of a noise class from a level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelStep {
@@ -40,8 +31,20 @@ pub struct LevelStep {
     pub next: StratumId,
     /// Whether there was no room for the level it should lead to, and `next` is the closest there is.
     pub cut: bool,
+    /// Where it leads if the reading is missing.
+    pub blind: BlindStep,
     /// Gain, innovation covariance and the rest of the step.
     pub correction: Correction,
+}
+
+/// Where a step leads after which nothing is sensed, to what the prediction leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BlindStep {
+    /// The level it leads to.
+    pub next: StratumId,
+    /// Whether `next` is only the closest level there is. So it is where the model's readings always come, and one is missing all the
+    /// same.
+    pub cut: bool,
 }
 
 /// All levels that can be reached, and how.
@@ -59,7 +62,8 @@ pub struct LevelGraph {
     ends: bool,
     /// Levels at which a class has come to rest.
     settled: Vec<bool>,
-    classes: Vec<NoiseClass>,
+    /// Of each noise class, actions that disturb state and sensor in the same way, the first.
+    classes: Vec<ActionId>,
     class_of_action: Vec<ClassId>,
     /// By level, then class.
     steps: Vec<Vec<LevelStep>>,
@@ -106,24 +110,25 @@ impl LevelGraph {
             }
             level += 1;
         }
+        graph.lead_on_blindly(model);
         graph
     }
 
     fn with_classes(model: &Model) -> Self {
-        let mut classes: Vec<NoiseClass> = Vec::new();
+        let mut classes: Vec<ActionId> = Vec::new();
+        let alike = |a: ActionId, b: ActionId| {
+            model.phases().all(|step| {
+                model.motion_noise(a, step) == model.motion_noise(b, step)
+                    && model.sensor_noise(a, step) == model.sensor_noise(b, step)
+            })
+        };
         let class_of_action = (0..model.actions.len())
             .map(|action| {
-                let class = NoiseClass {
-                    motion_noise: model.motion_noise(action).clone(),
-                    sensor_noise: model.sensor_noise(action).clone(),
-                };
-                classes
-                    .iter()
-                    .position(|known| *known == class)
-                    .unwrap_or_else(|| {
-                        classes.push(class);
-                        classes.len() - 1
-                    })
+                let known = classes.iter().position(|&example| alike(example, action));
+                known.unwrap_or_else(|| {
+                    classes.push(action);
+                    classes.len() - 1
+                })
             })
             .collect();
         let (n, m) = (model.state_dim(), model.observation_dim());
@@ -148,22 +153,66 @@ impl LevelGraph {
     }
 
     fn explore(&mut self, model: &Model, level: StratumId, class: ClassId) -> LevelStep {
-        let NoiseClass {
-            motion_noise,
-            sensor_noise,
-        } = &self.classes[class];
+        let (action, time) = (self.classes[class], self.times[level]);
         let correction = Correction::new(
-            &model.motion.a,
-            motion_noise,
-            &model.sensor.h,
-            sensor_noise,
+            &model.motion_at(time).a,
+            model.motion_noise(action, time),
+            &model.sensor_at(time).h,
+            model.sensor_noise(action, time),
             &self.covariances[level],
         );
         let (next, cut) = self.lead(model, level, class, &correction.covariance);
+        let mut blind = BlindStep {
+            next: level,
+            cut: false,
+        };
+        // Where readings always come, the closest level is found once all are known.
+        if model.sensor_at(time).present < 1.0 && !self.is_over(level) {
+            let time = (time + 1).min(self.clock);
+            (blind.next, blind.cut) = self.reach(model, level, &correction.predicted, time);
+        }
         LevelStep {
             next,
             cut,
+            blind,
             correction,
+        }
+    }
+
+    /// The level at a time with a covariance, a new one where there is none; the closest, and true, where there is no room.
+    fn reach(
+        &mut self,
+        model: &Model,
+        from: StratumId,
+        covariance: &DMatrix<f64>,
+        time: usize,
+    ) -> (StratumId, bool) {
+        match self.nearest(covariance, model.belief.level_tolerance, time) {
+            Some(found) => (found, false),
+            None if self.has_room(model, time) => (self.add(covariance.clone(), time), false),
+            None => {
+                self.converged = false;
+                self.cramped |= self.held_at(time) < model.belief.level_limit;
+                (self.closest(covariance, time).unwrap_or(from), true)
+            }
+        }
+    }
+
+    /// Where a reading is missing that the model expects, the belief goes on at the closest level there is.
+    fn lead_on_blindly(&mut self, model: &Model) {
+        for level in 0..self.covariances.len() {
+            if model.sensor_at(self.times[level]).present < 1.0 || self.is_over(level) {
+                continue;
+            }
+            let time = (self.times[level] + 1).min(self.clock);
+            for class in 0..self.classes.len() {
+                let predicted = &self.steps[level][class].correction.predicted;
+                let closest = self.closest(predicted, time);
+                self.steps[level][class].blind = BlindStep {
+                    next: closest.unwrap_or(level),
+                    cut: true,
+                };
+            }
         }
     }
 
@@ -183,23 +232,14 @@ impl LevelGraph {
             Some(found) if found == level && !self.settled[level] => {
                 (self.settle(model, class, covariance), false)
             }
-            Some(found) => (found, false),
-            None if self.has_room(model, time) => (self.add(covariance.clone(), time), false),
-            None => {
-                self.converged = false;
-                self.cramped |= self.held_at(time) < model.belief.level_limit;
-                (self.closest(covariance, time).unwrap_or(level), true)
-            }
+            _ => self.reach(model, level, covariance, time),
         }
     }
 
     /// The steady level of a class whose covariance no longer changes by more than the tolerance.
     fn settle(&mut self, model: &Model, class: ClassId, covariance: &DMatrix<f64>) -> StratumId {
-        let NoiseClass {
-            motion_noise,
-            sensor_noise,
-        } = &self.classes[class];
-        let steady = steady_state(&model.motion.a, motion_noise, &model.sensor.h, sensor_noise)
+        let steady = self
+            .steady_state(model, class)
             .unwrap_or_else(|_| covariance.clone());
         let steady = self
             .nearest(&steady, SAME, self.clock)
@@ -279,8 +319,19 @@ impl LevelGraph {
         &root * root.transpose()
     }
 
-    /// The noise classes.
-    pub fn classes(&self) -> &[NoiseClass] {
+    /// Where a class's covariance comes to rest if its action is taken for ever, once the model's clock has run out.
+    fn steady_state(&self, model: &Model, class: ClassId) -> Result<DMatrix<f64>> {
+        let (action, time) = (self.classes[class], self.clock);
+        steady_state(
+            &model.motion_at(time).a,
+            model.motion_noise(action, time),
+            &model.sensor_at(time).h,
+            model.sensor_noise(action, time),
+        )
+    }
+
+    /// The first action of each noise class: actions of one disturb state and sensor in the same way.
+    pub fn classes(&self) -> &[ActionId] {
         &self.classes
     }
 
@@ -379,20 +430,14 @@ impl LevelGraph {
         if self.converged {
             return Ok(());
         }
-        for (id, class) in self.classes.iter().enumerate() {
+        for id in 0..self.classes.len() {
             let grows = (0..self.len()).any(|level| {
                 let LevelStep {
                     next, correction, ..
                 } = &self.steps[level][id];
                 *next == level && correction.covariance.trace() > self.covariances[level].trace()
             });
-            let steady = steady_state(
-                &model.motion.a,
-                &class.motion_noise,
-                &model.sensor.h,
-                &class.sensor_noise,
-            );
-            match steady {
+            match self.steady_state(model, id) {
                 Err(error @ Error::NoSteadyState { .. }) if grows => return Err(error),
                 _ => {}
             }

@@ -154,9 +154,19 @@ impl BeliefMdp {
         self.levels.class_of(action)
     }
 
-    /// The stratum after a step of a class that was sensed.
+    /// The stratum after a step of a class.
     pub fn next(&self, stratum: StratumId, class: ClassId) -> StratumId {
         self.levels.step(stratum, class).next
+    }
+
+    /// The stratum after a step of a class whose reading is missing.
+    pub fn next_blind(&self, stratum: StratumId, class: ClassId) -> StratumId {
+        self.levels.step(stratum, class).blind.next
+    }
+
+    /// Probability that there is a reading after a step from a stratum.
+    pub fn present(&self, stratum: StratumId) -> f64 {
+        self.model.sensor_at(self.levels.time(stratum)).present
     }
 
     /// Checks that every belief is one, see [`LevelGraph::check`].
@@ -259,16 +269,17 @@ impl BeliefMdp {
         if when == When::Before || self.read_as_mixture().is_some() {
             return self.mass(level, mean, region);
         }
-        let predicted = self.predicted(mean, action);
+        let predicted = self.predicted(level, mean, action);
         let class = self.levels.class_of(action);
         let covariance = &self.levels.step(level, class).correction.predicted;
         region_probability(predicted.as_slice(), covariance, region)
     }
 
     /// Where an action leads from a state or mean, noise apart: `A m + B u`, on this side of every wall the belief knows of.
-    pub fn predicted(&self, mean: &[f64], action: ActionId) -> DVector<f64> {
-        let moved = &self.model.motion.a * DVector::from_column_slice(mean)
-            + self.model.displacement(action);
+    pub fn predicted(&self, stratum: StratumId, mean: &[f64], action: ActionId) -> DVector<f64> {
+        let time = self.levels.time(stratum);
+        let moved = &self.model.motion_at(time).a * DVector::from_column_slice(mean)
+            + self.model.displacement(action, time);
         self.stop(mean, moved)
     }
 
@@ -290,9 +301,10 @@ impl BeliefMdp {
         if alive.sides.is_empty() || self.model.actions[action].then != Then::Continue {
             return Survival::SURE;
         }
-        let (a, covariance) = (&self.model.motion.a, self.levels.covariance(level));
+        let a = &self.model.motion_at(self.levels.time(level)).a;
+        let covariance = self.levels.covariance(level);
         let step = self.levels.step(level, self.levels.class_of(action));
-        let predicted = self.predicted(mean, action);
+        let predicted = self.predicted(level, mean, action);
         let carried = a * covariance;
         let sides = alive.sides.iter().map(|&(i, side)| {
             let later = (predicted[i], step.correction.predicted[(i, i)]);
@@ -395,15 +407,16 @@ impl BeliefMdp {
         mean: &[f64],
         action: ActionId,
     ) -> Vec<(f64, DVector<f64>)> {
-        let predicted = self.predicted(mean, action);
+        let predicted = self.predicted(level, mean, action);
         let Some(mixture) = self.read_as_mixture() else {
             return vec![(1.0, predicted)];
         };
         let class = self.levels.class_of(action);
         let gain = &self.levels.step(level, class).correction.gain;
+        let h = &self.model.sensor_at(self.levels.time(level)).h;
         let mut centres = mixture.hypotheses(level, mean);
         for (_, x) in &mut centres {
-            *x = &predicted + gain * &self.model.sensor.h * (&*x - &predicted);
+            *x = &predicted + gain * h * (&*x - &predicted);
         }
         centres
     }
@@ -415,8 +428,9 @@ impl BeliefMdp {
         match self.read_as_mixture() {
             None => self.levels.mean_covariance(level, class),
             Some(mixture) => {
-                let (gain, h) = (&step.correction.gain, &self.model.sensor.h);
-                let noise = &self.levels.classes()[class].sensor_noise;
+                let time = self.levels.time(level);
+                let (gain, h) = (&step.correction.gain, &self.model.sensor_at(time).h);
+                let noise = self.model.sensor_noise(self.levels.classes()[class], time);
                 let innovation = h * mixture.covariance(level) * h.transpose() + noise;
                 gain * innovation * gain.transpose()
             }

@@ -101,13 +101,14 @@ fn suits(model: &Model) -> bool {
     let alike = |start: &StartHypothesis| {
         (start.mode, &start.covariance) == (first.mode, &first.covariance)
     };
-    let still = |action| {
-        model.motion_noise(action).amax() == 0.0 && model.displacement(action).amax() == 0.0
+    let still = |step| {
+        model.motion_at(step).a == DMatrix::identity(n, n)
+            && (0..model.actions.len()).all(|action| {
+                model.motion_noise(action, step).amax() == 0.0
+                    && model.displacement(action, step).amax() == 0.0
+            })
     };
-    model.start.len() > 1
-        && model.start.iter().all(alike)
-        && model.motion.a == DMatrix::identity(n, n)
-        && (0..model.actions.len()).all(still)
+    model.start.len() > 1 && model.start.iter().all(alike) && model.phases().all(still)
 }
 
 fn inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {

@@ -178,7 +178,11 @@ impl StateMdp {
             Then::Restart => Next::Restart,
             Then::Continue => Next::Continue {
                 mode: outcome.mode,
-                centre: self.belief_mdp.predicted(state, action).as_slice().to_vec(),
+                centre: self
+                    .belief_mdp
+                    .predicted(0, state, action)
+                    .as_slice()
+                    .to_vec(),
             },
         };
         Entry { reward, next }
@@ -188,8 +192,11 @@ impl StateMdp {
     fn smoothers(&self) -> Vec<Option<Smoother>> {
         let classes = self.belief_mdp.levels().classes().iter();
         classes
-            .map(|class| match &self.space {
-                Space::Grid(grid) => Some(grid.smoother(&class.motion_noise)),
+            .map(|&example| match &self.space {
+                Space::Grid(grid) => {
+                    let noise = self.model().motion_noise(example, 0);
+                    Some(grid.smoother(noise))
+                }
                 Space::Points(_) => None,
             })
             .collect()
@@ -334,7 +341,7 @@ fn space(belief_mdp: &BeliefMdp, settings: &Settings) -> Result<Space> {
             .levels()
             .classes()
             .iter()
-            .map(|class| class.motion_noise[(variable, variable)])
+            .map(|&example| model.motion_noise(example, 0)[(variable, variable)])
             .fold(0.0, f64::max);
         Axis::around(bounds, variance.sqrt(), points)
     });

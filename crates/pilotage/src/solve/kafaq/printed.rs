@@ -154,7 +154,7 @@ impl State {
                 break;
             }
             let regions = &mut self.regions;
-            let mean = actor.belief.mean.clone();
+            let mean = actor.belief().mean.clone();
             let current = find_current_segment(regions, &mean);
             if let Some((before, action, reward)) = previous {
                 let next = regions[current].values[regions[current].best()];
@@ -174,7 +174,7 @@ impl State {
                 acting = regions.len() - 1;
                 self.calm = 0;
             }
-            let at_steady = actor.belief.stratum == task.steady();
+            let at_steady = actor.belief().stratum == task.steady();
             let step = actor.step(action, &mut draws);
             self.experience.collect(step.reward);
             self.reward += step.reward;

@@ -133,7 +133,7 @@ impl<'a> Task<'a> {
 
     /// An actor in a new world.
     pub fn actor(&self) -> Actor<'_> {
-        Actor::new(self.worlds, &self.filter)
+        Actor::new(self.worlds, &self.filter, self.filter.readings())
     }
 
     /// Runs an automaton, the same episodes at every trial.

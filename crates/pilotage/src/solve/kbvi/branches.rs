@@ -316,7 +316,7 @@ impl<'a> Search<'a> {
             return then;
         }
         let class = self.mdp.class_of(action);
-        let mut mean = self.mdp.predicted(at.mean.as_slice(), action);
+        let mut mean = self.mdp.predicted(level, at.mean.as_slice(), action);
         if let Some(point) = self.case {
             let step = self
                 .mdp

@@ -101,18 +101,20 @@ impl Formulas {
         let step = mdp.levels().step(from.level, class);
         let (a, h) = (&model.motion.a, &model.sensor.h);
         let gain = &step.correction.gain;
-        let noise = &mdp.levels().classes()[class];
+        let action = mdp.levels().classes()[class];
+        let (motion_noise, sensor_noise) =
+            (model.motion_noise(action, 0), model.sensor_noise(action, 0));
         let carried = a * &from.covariance * a.transpose();
-        let told = gain * &noise.sensor_noise * gain.transpose();
+        let told = gain * sensor_noise * gain.transpose();
         let covariance = match (self.spread, known) {
             (SpreadFormula::Exact, false) => carried + step.correction.mean_covariance(),
             (SpreadFormula::Exact, true) => {
                 let keep = DMatrix::identity(a.nrows(), a.nrows()) - gain * h;
                 &keep * carried * keep.transpose() + told
             }
-            (SpreadFormula::Printed, false) => carried + &noise.motion_noise + told,
+            (SpreadFormula::Printed, false) => carried + motion_noise + told,
             (SpreadFormula::Printed, true) => {
-                let moved = carried + &noise.motion_noise;
+                let moved = carried + motion_noise;
                 let taken = gain * (h * &moved * h.transpose()) * gain.transpose();
                 moved + told - taken
             }

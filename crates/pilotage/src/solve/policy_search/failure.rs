@@ -25,7 +25,7 @@ pub struct Runs {
     /// Keeps the belief that is acted on.
     agent: Filter,
     /// Who is told where each run begins; nobody where the agent's own belief is all there is to know.
-    observer: Option<Progress>,
+    observer: Option<Observer>,
     /// What the belief that tells of failures is made of: of the observer, or else the agent.
     covariances: Vec<DMatrix<f64>>,
     alive: Region,
@@ -37,7 +37,7 @@ pub struct Runs {
 
 /// A filter that begins with certainty.
 #[derive(Debug)]
-struct Progress {
+struct Observer {
     filter: Filter,
     /// Starts are drawn here.
     scenario: Scenario,
@@ -80,14 +80,14 @@ impl Runs {
             start: vec![certain],
             ..model.clone()
         });
-        let observer = Progress {
+        let observer = Observer {
             filter: told.filter(),
             scenario: Scenario::assumed(model),
         };
         Self::new(&told, mdp.filter(), Some(observer))
     }
 
-    fn new(mdp: &BeliefMdp, agent: Filter, observer: Option<Progress>) -> Self {
+    fn new(mdp: &BeliefMdp, agent: Filter, observer: Option<Observer>) -> Self {
         let (model, levels) = (mdp.model(), mdp.levels());
         let actions = 0..model.actions.len();
         let h = &model.sensor.h;
@@ -105,7 +105,7 @@ impl Runs {
             carried: (h * &model.motion.a).transpose().as_slice().to_vec(),
             pushed: actions
                 .clone()
-                .map(|action| (h * model.displacement(action)).as_slice().to_vec())
+                .map(|action| (h * model.displacement(action, 0)).as_slice().to_vec())
                 .collect(),
             innovations: (0..levels.len())
                 .map(|level| {
@@ -240,14 +240,14 @@ impl Runs {
 
 /// An observer during a run.
 struct Told<'a> {
-    observer: &'a Progress,
+    observer: &'a Observer,
     belief: Belief,
     world: ProblemWorld,
     draws: Streams,
 }
 
 impl<'a> Told<'a> {
-    fn new(observer: &'a Progress, draws: Streams) -> Self {
+    fn new(observer: &'a Observer, draws: Streams) -> Self {
         let mut told = Self {
             belief: observer.filter.initial(),
             world: ProblemWorld::new(&observer.scenario),

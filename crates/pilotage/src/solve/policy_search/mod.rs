@@ -119,7 +119,8 @@ impl Planner for PolicySearch {
 
     fn accepts(&self, model: &Model) -> Result<()> {
         let mdp = BeliefMdp::new(model);
-        refuse_if(SOLVER, model, refusal(&mdp, self.aim(model)))
+        let reason = refusals::steps_differ(model).or_else(|| refusal(&mdp, self.aim(model)));
+        refuse_if(SOLVER, model, reason)
     }
 
     fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {

@@ -92,12 +92,16 @@ fn axis(mdp: &BeliefMdp, variable: usize, points: usize) -> Axis {
 /// The length of which all ways that actions take along a variable are multiples, where it moves by them alone.
 fn stride(model: &Model, variable: usize) -> Option<f64> {
     const FINEST: f64 = 1e-6;
-    let row = model.motion.a.row(variable);
-    let stays = row
-        .iter()
-        .enumerate()
-        .all(|(i, a)| *a == f64::from(i == variable));
-    let ways = (0..model.actions.len()).map(|action| model.displacement(action)[variable].abs());
+    let stays = model.phases().all(|step| {
+        let row = model.motion_at(step).a.row(variable);
+        let mut entries = row.iter().enumerate();
+        entries.all(|(i, a)| *a == f64::from(i == variable))
+    });
+    let actions = 0..model.actions.len();
+    let ways = model.phases().flat_map(|step| {
+        let way = move |action| model.displacement(action, step)[variable].abs();
+        actions.clone().map(way)
+    });
     let ways: Vec<f64> = ways.filter(|way| *way > 0.0).collect();
     let largest = ways.iter().copied().fold(0.0, f64::max);
     let common = ways.iter().fold(0.0, |mut a: f64, &b| {
@@ -213,7 +217,8 @@ fn resolves(mdp: &BeliefMdp, axes: &[Axis]) -> Result<()> {
 fn functions(mdp: &BeliefMdp) -> u64 {
     let (strata, classes) = (mdp.strata(), mdp.classes());
     let limits = usize::from(!mdp.model().episode.alive.sides.is_empty());
-    (strata * (mdp.model().modes.len() * (1 + classes) + limits)) as u64
+    let expectations = classes * if mdp.model().misses_readings() { 2 } else { 1 };
+    (strata * (mdp.model().modes.len() * (1 + expectations) + limits)) as u64
 }
 
 /// Memory for the functions on a grid of so many points.

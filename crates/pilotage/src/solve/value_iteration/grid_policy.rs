@@ -9,7 +9,8 @@
 //!
 //! The expectation is taken first, once for each stratum and noise class: `W(x) = E V(x + K nu)` on the grid of means. Then
 //! `Q` is one look-up of `W` at `A m + B u` for each action. Where the model has failure limits, the step may fail: with probability
-//! `f(b, a)` it earns the reward of failing and nothing more.
+//! `f(b, a)` it earns the reward of failing and nothing more. Where the reading may be missing, the mean is then where it was predicted:
+//! `V` itself is looked up there, at the stratum that the filter is left with.
 //!
 //! Levels are solved in the order in which the filter leaves them, last first, so only those that come back to themselves need
 //! iterating.
@@ -21,7 +22,7 @@ use petgraph::graph::{DiGraph, NodeIndex};
 use super::extent::{axes, knows_map, mebibytes};
 use crate::belief::{Belief, BeliefMdp, StratumId};
 use crate::error::{Error, Result};
-use crate::model::{ActionId, Then};
+use crate::model::{ActionId, Outcome, Then};
 use crate::policy::Policy;
 use crate::progress::Progress;
 use crate::solve::grid::{Axis, Grid, Interpolation, Settings, Smoother};
@@ -36,7 +37,7 @@ pub struct GridPolicy {
     /// `V`, by mode and stratum.
     pub(super) values: Vec<Vec<f64>>,
     /// `discount * W`, by mode, stratum and noise class: what is still to come after an action of the class, by where the next
-    /// mean is centred.
+    /// mean is centred. Where readings may be missing, as many follow for the steps after which one is.
     pub(super) expected: Vec<Vec<f64>>,
     /// Probability of being within the limits, by stratum; empty without limits.
     alive: Vec<Vec<f64>>,
@@ -89,6 +90,11 @@ pub(super) fn iterate(
     Ok(policy)
 }
 
+/// Kinds of expectations: after a reading, and after none where one may be missing.
+fn kinds(mdp: &BeliefMdp) -> usize {
+    if mdp.model().misses_readings() { 2 } else { 1 }
+}
+
 /// Probability of being within the limits at every point, by stratum; empty without limits.
 fn alive(mdp: &BeliefMdp, grid: &Grid) -> Vec<Vec<f64>> {
     if mdp.model().episode.alive.sides.is_empty() {
@@ -105,8 +111,12 @@ fn groups_of_levels(mdp: &BeliefMdp) -> Vec<Vec<StratumId>> {
         return vec![(0..mdp.strata()).rev().collect()];
     }
     let edges = (0..mdp.strata()).flat_map(|stratum| {
-        let next = move |class| mdp.next(stratum, class) as u32;
-        (0..mdp.classes()).map(move |class| (stratum as u32, next(class)))
+        let classes = 0..mdp.classes();
+        let after = classes.flat_map(move |class| {
+            let blind = (mdp.present(stratum) < 1.0).then(|| mdp.next_blind(stratum, class));
+            std::iter::once(mdp.next(stratum, class)).chain(blind)
+        });
+        after.map(move |next| (stratum as u32, next as u32))
     });
     let graph = DiGraph::<(), ()>::from_edges(edges);
     let group = |nodes: Vec<NodeIndex>| {
@@ -126,7 +136,7 @@ impl GridPolicy {
         let (modes, strata, classes) = (mdp.model().modes.len(), mdp.strata(), mdp.classes());
         Self {
             values: vec![vec![0.0; grid.len()]; modes * strata],
-            expected: vec![vec![0.0; grid.len()]; modes * strata * classes],
+            expected: vec![vec![0.0; grid.len()]; modes * strata * classes * kinds(&mdp)],
             alive: alive(&mdp, &grid),
             start_value: 0.0,
             promised: None,
@@ -214,8 +224,10 @@ impl GridPolicy {
         mode * self.mdp.strata() + stratum
     }
 
-    fn expected_index(&self, mode: usize, stratum: StratumId, class: usize) -> usize {
-        self.value_index(mode, stratum) * self.mdp.classes() + class
+    /// Place of the expectation after a step of a class, sensed or blind.
+    fn expected_index(&self, mode: usize, stratum: StratumId, class: usize, blind: bool) -> usize {
+        let row = self.value_index(mode, stratum) * kinds(&self.mdp) + usize::from(blind);
+        row * self.mdp.classes() + class
     }
 
     /// Value iteration on a group of strata until the change bounds the error by the tolerance.
@@ -287,7 +299,11 @@ impl GridPolicy {
     /// Whether no action comes back to the stratum, nor to the start.
     fn leaves_itself(&self, stratum: StratumId) -> bool {
         !self.mdp.model().restarts()
-            && (0..self.mdp.classes()).all(|class| self.mdp.next(stratum, class) != stratum)
+            && (0..self.mdp.classes()).all(|class| {
+                self.mdp.next(stratum, class) != stratum
+                    && (self.mdp.present(stratum) == 1.0
+                        || self.mdp.next_blind(stratum, class) != stratum)
+            })
     }
 
     fn average(&self, spread: &DMatrix<f64>) -> Average {
@@ -302,8 +318,13 @@ impl GridPolicy {
         for mode in 0..self.mdp.model().modes.len() {
             for (class, smoother) in smoothers.iter().enumerate() {
                 let next = self.mdp.next(stratum, class);
-                let index = self.expected_index(mode, stratum, class);
+                let index = self.expected_index(mode, stratum, class, false);
                 self.expected[index] = smoother.apply(&self.grid, &self.to_come(mode, next));
+                if self.mdp.present(stratum) < 1.0 {
+                    let next = self.mdp.next_blind(stratum, class);
+                    let index = self.expected_index(mode, stratum, class, true);
+                    self.expected[index] = self.to_come(mode, next);
+                }
             }
         }
     }
@@ -367,14 +388,28 @@ impl GridPolicy {
             reward += share(Then::Continue) * fails * model.episode.failure_reward;
         }
         let class = self.mdp.class_of(action);
-        let next: Vec<(usize, f64)> = outcomes
-            .iter()
-            .filter(|outcome| outcome.then == Then::Continue && survival.odds > 0.0)
-            .map(|outcome| {
-                let index = self.expected_index(outcome.mode, stratum, class);
-                (index, survival.odds * outcome.probability)
+        let next = |blind: bool, chance: f64| -> Vec<(usize, f64)> {
+            let goes_on = outcomes
+                .iter()
+                .filter(|outcome| outcome.then == Then::Continue && survival.odds > 0.0);
+            let look_up = |outcome: &Outcome| {
+                let index = self.expected_index(outcome.mode, stratum, class, blind);
+                (index, chance * survival.odds * outcome.probability)
+            };
+            goes_on.map(look_up).collect()
+        };
+        let present = self.mdp.present(stratum);
+        let blind = (present < 1.0).then(|| {
+            Box::new(Blind {
+                next: next(true, 1.0 - present),
+                mean: self
+                    .mdp
+                    .predicted(stratum, mean, action)
+                    .as_slice()
+                    .to_vec(),
             })
-            .collect();
+        });
+        let next = next(false, present);
         let centres = if next.is_empty() {
             Vec::new()
         } else {
@@ -389,6 +424,7 @@ impl GridPolicy {
             restart: share(Then::Restart),
             next,
             centres,
+            blind,
         }
     }
 
@@ -398,6 +434,11 @@ impl GridPolicy {
             for (weight, centre) in &entry.centres {
                 future +=
                     probability * weight * self.grid.interpolate(&self.expected[*expected], centre);
+            }
+        }
+        if let Some(Blind { next, mean }) = entry.blind.as_deref() {
+            for (expected, probability) in next {
+                future += probability * self.grid.interpolate(&self.expected[*expected], mean);
             }
         }
         entry.reward + future
@@ -442,6 +483,14 @@ pub(super) struct Entry {
     restart: f64,
     next: Vec<(usize, f64)>,
     centres: Vec<(f64, Vec<f64>)>,
+    blind: Option<Box<Blind>>,
+}
+
+/// What is looked up, and where, if the reading is missing.
+#[derive(Debug)]
+struct Blind {
+    next: Vec<(usize, f64)>,
+    mean: Vec<f64>,
 }
 
 #[derive(Debug)]
