@@ -56,7 +56,11 @@ impl Nearby {
             if down.min(up) > reach {
                 break;
             }
-            let next = if down <= up { below.next() } else { above.next() };
+            let next = if down <= up {
+                below.next()
+            } else {
+                above.next()
+            };
             let Some(&(.., place)) = next else { break };
             let found = (distance(to, &list[place]), place);
             if found.0 <= within && best.is_none_or(|best| found < best) {
