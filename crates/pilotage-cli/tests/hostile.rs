@@ -50,6 +50,22 @@ fn solve_to(folder: &Path, out: &str) -> Output {
     pilotage(folder, &arguments).output().unwrap()
 }
 
+/// Changes the policy in a file, and gives it the checksum of what it has become: FNV-1a over the policy without white space between its
+/// values.
+fn edit(file: &Path, edit: impl FnOnce(&mut serde_json::Value)) {
+    let mut whole: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
+    edit(&mut whole["policy"]);
+    let policy = whole["policy"].to_string();
+    let checksum = policy
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+    whole["checksum"] = format!("fnv1a64-{checksum:016x}").into();
+    fs::write(file, whole.to_string()).unwrap();
+}
+
 fn is_policy(text: &str) -> bool {
     text.contains("\"policy\"")
 }
@@ -197,7 +213,6 @@ fn a_wrong_name_for_the_output_is_known_before_the_work_is_done() {
     assert!(clock.elapsed() < Duration::from_secs(10));
 }
 
-/// A learner writes its checkpoint all the time; whenever it is ended, by whatever signal, nothing else is left behind.
 /// The program, told to hear signals that whoever started the tests may ignore, as `nohup` does.
 fn hearing_signals(folder: &Path, arguments: &[&str]) -> Command {
     if !cfg!(target_os = "linux") {
@@ -212,6 +227,7 @@ fn hearing_signals(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
+/// A learner writes its checkpoint all the time; whenever it is ended, by whatever signal, nothing else is left behind.
 #[test]
 fn signals_leave_no_temporary_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -515,16 +531,161 @@ fn a_hundred_thousand_levels_are_checked_and_planned_for() {
 #[test]
 fn a_policy_does_not_choose_the_files_that_are_read() {
     let folder = tempfile::tempdir().unwrap();
-    assert!(solve_to(folder.path(), "p.json").status.success());
-    let policy = fs::read_to_string(folder.path().join("p.json")).unwrap();
-    fs::write(folder.path().join("secret"), "password = 'abc'").unwrap();
-    let named = policy.replacen("\"tiger\"", "\"secret\"", 1);
-    fs::write(folder.path().join("p.json"), named).unwrap();
-    let output = pilotage(folder.path(), &["draw", "p.json"])
-        .output()
-        .unwrap();
-    assert!(!output.status.success());
-    assert!(!text(&output.stderr).contains("password"));
+    let here = folder.path();
+    fs::write(here.join("secret"), "password = 'abc'").unwrap();
+    fs::write(here.join("corridor.toml"), built_in("corridor")).unwrap();
+    assert!(solve_to(here, "p.json").status.success());
+    for named in ["secret", "./secret", "corridor.toml"] {
+        edit(&here.join("p.json"), |policy| {
+            policy["problem"] = named.into()
+        });
+        let output = pilotage(here, &["draw", "p.json"]).output().unwrap();
+        let said = text(&output.stderr);
+        assert!(!said.contains("password"), "{said}");
+        refused(here, &["draw", "p.json"], "which is not built in");
+    }
+}
+
+/// Numbers and names of a policy file, edited by hand by somebody who corrects its checksum.
+#[test]
+fn a_policy_whose_numbers_lead_nowhere_is_refused_or_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let file = here.join("p.json");
+    let solve = "solve corridor --episodes 10 --grid 101 --out p.json";
+    let solve: Vec<&str> = solve.split(' ').collect();
+    assert!(pilotage(here, &solve).output().unwrap().status.success());
+    let whole = fs::read_to_string(&file).unwrap();
+    let simulate = [
+        "simulate",
+        "corridor",
+        "--policy",
+        "p.json",
+        "--episodes",
+        "10",
+    ];
+    edit(&file, |_| {});
+    let unchanged = pilotage(here, &simulate).output().unwrap();
+    assert!(unchanged.status.success(), "{}", text(&unchanged.stderr));
+
+    let huge = "no number may be larger than";
+    for (pointer, value, says) in [
+        ("/filter/A/0/0", serde_json::json!(1e200), huge),
+        ("/filter/Bu/0/0", serde_json::json!(-1e200), huge),
+        ("/filter/H/0/0", serde_json::json!(1e308), huge),
+        (
+            "/filter/levels/0/steps/0/gain/0/0",
+            serde_json::json!(1e200),
+            huge,
+        ),
+        ("/start/mean/0", serde_json::json!(1e200), huge),
+        ("/nodes/0/value", serde_json::json!(-1e308), huge),
+        (
+            "/filter/levels/0/covariance/0/0",
+            serde_json::json!(-1),
+            "not positive semi-definite",
+        ),
+        (
+            "/filter/levels/0/steps/0/next",
+            serde_json::json!(u64::MAX),
+            "levels, counted from 0",
+        ),
+        ("/scale/0", serde_json::json!(1e-320), "where at least"),
+        ("/scale/0", serde_json::json!(0), "where at least"),
+        ("/nodes", serde_json::json!([]), "the list is empty"),
+        (
+            "/solver",
+            serde_json::json!("\u{1b}]0;owned\u{7}"),
+            "\\u{1b}",
+        ),
+        ("/problem", serde_json::json!("corridor\u{7}"), "\\u{7}"),
+        ("/actions/0", serde_json::json!("EAST\u{202e}"), "\\u{202e}"),
+        ("/states/0", serde_json::json!("x\u{9b}2J"), "\\u{9b}"),
+    ] {
+        fs::write(&file, &whole).unwrap();
+        edit(&file, |policy| {
+            *policy.pointer_mut(pointer).unwrap() = value;
+        });
+        refused(here, &simulate, says);
+        refused(here, &["draw", "p.json"], says);
+    }
+    // Each number is allowed, and together they grow from step to step.
+    fs::write(&file, &whole).unwrap();
+    edit(&file, |policy| {
+        *policy.pointer_mut("/filter/A/0/0").unwrap() = serde_json::json!(1e20);
+    });
+    refused(here, &simulate, "the mean of the belief is");
+}
+
+/// Whatever a file or its name holds, nothing of it reaches the terminal that the terminal would obey.
+#[test]
+fn nothing_that_a_terminal_obeys_is_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let (escape, wrong) = ("\u{1b}]0;owned\u{7}", "a\u{1b}[2J.toml");
+    let (policy, setting) = ("p\u{1b}[2J.json", "a\u{1b}=1");
+    let corridor = built_in("corridor");
+    fs::write(here.join(wrong), &corridor).unwrap();
+    for (file, old, new) in [
+        ("raw.toml", "EAST", escape),
+        ("escaped.toml", "EAST", "\\u001b]0;owned\\u0007"),
+        ("c1.toml", "discount", "# \u{9b}2J\ndiscont"),
+        ("key.toml", "discount", "\"\\u001b[2J\" = 1\ndiscount"),
+    ] {
+        assert!(corridor.contains(old));
+        fs::write(here.join(file), corridor.replacen(old, new, 1)).unwrap();
+    }
+    let header = format!("{{\"format\": \"{escape}\"}}");
+    fs::write(here.join("policy.json"), header).unwrap();
+    let newer = "{\"format\": 99, \"pilotage\": \"\\u001b[2J\"}";
+    fs::write(here.join("newer.json"), newer).unwrap();
+    fs::write(here.join("run.json"), format!("{newer}\n{{}}\n")).unwrap();
+    let commands: &[&[&str]] = &[
+        &["check", wrong],
+        &["check", "raw.toml"],
+        &["check", "escaped.toml"],
+        &["check", "c1.toml"],
+        &["check", "key.toml"],
+        &["check", escape],
+        &["solve", wrong, "--episodes", "10", "--out", policy],
+        &["simulate", wrong, "--policy", policy, "--episodes", "10"],
+        &["draw", policy, "--problem", wrong],
+        &["draw", "policy.json"],
+        &["draw", "newer.json"],
+        &["draw", escape],
+        &["solve", "corridor", "--with", escape],
+        &["solve", "corridor", "--policy", escape],
+        &["solve", "corridor", "--seed", escape],
+        &["solve", "corridor", "--set", setting],
+        &["solve", "corridor", "--set", escape],
+        &["solve", "corridor", "--with", "kafaq", "--learn", setting],
+        &["solve", "corridor", escape],
+        &["reproduce", "--only", escape],
+        &["solve", "basic", "--with", "kafaq", "--checkpoint", policy],
+        &[
+            "solve",
+            "basic",
+            "--with",
+            "kafaq",
+            "--checkpoint",
+            "run.json",
+        ],
+        &[
+            "solve",
+            "basic",
+            "--with",
+            "kafaq",
+            "--checkpoint",
+            "n\u{1b}/x",
+        ],
+    ];
+    for arguments in commands {
+        let output = pilotage(here, arguments).output().unwrap();
+        let printed = text(&output.stdout) + &text(&output.stderr);
+        assert!(!printed.is_empty(), "{arguments:?}");
+        let obeyed = |c: char| c.is_control() && c != '\n' && c != '\t';
+        assert!(!printed.contains(obeyed), "{arguments:?}: {printed:?}");
+    }
 }
 
 /// However many episodes are asked for, few are kept.
