@@ -313,22 +313,40 @@ fn extreme_settings_are_refused_by_name() {
         (&["--threads", MAX], "at most 1024"),
         (
             &["--with", "policy-search", "--effort", "nan"],
-            "out of range",
-        ),
-        (
-            &["--with", "policy-search", "--effort", "0"],
-            "above 0, at most 1000",
+            "error: --effort NaN is no value of it: Factor on the length of all simulations; more than 0, at most 1000, and 1 is the \
+             thorough search.\n",
         ),
         (
             &["--with", "policy-search", "--effort", "inf"],
-            "out of range",
+            "error: --effort inf is no value of it: Factor on the length of all simulations; more than 0, at most 1000",
+        ),
+        (
+            &["--with", "policy-search", "--set", "effort=nan"],
+            "error: effort = nan is no value of it: Factor on the length of all simulations; more than 0, at most 1000",
+        ),
+        (
+            &["--with", "policy-search", "--set", "objective=luck"],
+            "error: objective = luck is no value of it: What is sought: `return`, or `survival`",
+        ),
+        (
+            &["--with", "policy-search", "--effort", "0"],
+            "error: --effort 0 is out of range: above 0, at most 1000\n",
         ),
         (
             &["--with", "policy-search", "--effort", "1e300"],
-            "above 0, at most 1000",
+            "is out of range: above 0, at most 1000\n",
         ),
-        (&["--grid", "0"], "points = 0 is out of range"),
-        (&["--grid", "1"], "points = 1 is out of range"),
+        (
+            &["--with", "policy-search", "--set", "effort=0"],
+            "error: effort = 0 is out of range: above 0, at most 1000\n",
+        ),
+        (
+            &["--with", "lqg", "--state-weights", "nan"],
+            "error: --state-weights [NaN] is no value of it: ",
+        ),
+        (&["--grid", "0"], "--grid 0 is out of range"),
+        (&["--grid", "1"], "--grid 1 is out of range"),
+        (&["--set", "points=0"], "points = 0 is out of range"),
         (
             &["--runs", MAX],
             "runs = 18446744073709551615 is out of range",
@@ -346,11 +364,11 @@ fn extreme_settings_are_refused_by_name() {
                 "--last-horizon",
                 MAX,
             ],
-            "first_horizon = 18446744073709551615 is out of range",
+            "first-horizon 18446744073709551615 is out of range",
         ),
         (
             &["--with", "kbvi", "--last-horizon", MAX],
-            "last_horizon = 18446744073709551615 is out of range",
+            "last-horizon 18446744073709551615 is out of range",
         ),
         (&["--grid", "100000000"], "more than the 1024 MiB allowed"),
         (&["--grid", MAX, "--memory", MAX], "MiB are free here"),
@@ -360,7 +378,7 @@ fn extreme_settings_are_refused_by_name() {
         ),
         (
             &["--with", "qmdp", "--grid", "0"],
-            "points = 0 is out of range",
+            "--grid 0 is out of range",
         ),
     ];
     for (settings, says) in rows {
@@ -369,6 +387,82 @@ fn extreme_settings_are_refused_by_name() {
             &[&["solve", "corridor"], *settings].concat(),
             says,
         );
+    }
+}
+
+#[test]
+fn counts_of_a_learner_that_no_run_comes_to_the_end_of_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let common = ["calm", "epoch", "epoch_limit", "trial"];
+    let own: [(&str, &[&str]); 2] = [
+        (
+            "kafaq",
+            &["cell_limit", "cells_along", "epoch_per_cell", "window"],
+        ),
+        (
+            "arkaq",
+            &[
+                "scout",
+                "settle",
+                "explore_limit",
+                "state_limit",
+                "epoch_per_entry",
+                "depth",
+            ],
+        ),
+    ];
+    for (learner, own) in own {
+        for key in common.iter().chain(own) {
+            let setting = format!("{key}={MAX}");
+            let arguments = ["solve", "basic", "--with", learner, "--learn", &setting];
+            let says = format!("{key} = {MAX} is out of range");
+            refused(folder.path(), &arguments, &says);
+        }
+    }
+}
+
+#[test]
+fn a_checkpoint_is_a_file_that_can_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    assert!(system(here, &["mkfifo", "pipe"]));
+    for (learner, checkpoint, says) in [
+        ("kafaq", "/dev/null", "this is no file"),
+        ("arkaq", "/dev/zero", "this is no file"),
+        ("arkaq", "pipe", "this is no file"),
+        ("kafaq", ".", "this is a directory"),
+        ("arkaq", "missing/run.json", "missing/run.json"),
+    ] {
+        let arguments = [
+            "solve",
+            "stations-5x5",
+            "--with",
+            learner,
+            "--learn",
+            "epoch=100000000",
+            "--checkpoint",
+            checkpoint,
+        ];
+        refused(here, &arguments, says);
+    }
+}
+
+/// A disk that is full, or a policy too large for a file, is met only when the work is done; what it came to is told all the same.
+#[test]
+fn a_policy_that_cannot_be_kept_is_not_lost_without_a_word() {
+    let folder = tempfile::tempdir().unwrap();
+    for (json, shows) in [
+        (None, "discounted return"),
+        (Some("--json"), "\"evaluation\""),
+    ] {
+        let arguments = [&SOLVE[..], &["--out", "/dev/full"]].concat();
+        let mut command = pilotage(folder.path(), &arguments);
+        let output = command.args(json).output().unwrap();
+        let (printed, said) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.starts_with("error: /dev/full: "), "{said}");
+        assert!(printed.contains(shows), "{printed}");
+        assert!(!printed.contains("kept in"), "{printed}");
     }
 }
 
