@@ -390,6 +390,28 @@ fn extreme_settings_are_refused_by_name() {
     }
 }
 
+/// What is kept of a grid may have room where what a sweep looks up at its points has none.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_is_counted_before_it_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = fs::read_to_string("/proc/meminfo").unwrap();
+    let free = table.lines().find_map(|line| {
+        let number = line.strip_prefix("MemAvailable:")?;
+        number.split_whitespace().next()?.parse::<u64>().ok()
+    });
+    // A fifth of what is free or less for the functions, and more than all of it with three look-ups of 200 bytes a point.
+    let points = free.unwrap() * 1024 / 550;
+    let limited = format!(
+        "ulimit -v 4000000; '{}' solve corridor --grid {points} --memory {MAX}",
+        env!("CARGO_BIN_EXE_pilotage")
+    );
+    let output = shell(folder.path(), &limited);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("MiB are free here"), "{said}");
+}
+
 #[test]
 fn counts_of_a_learner_that_no_run_comes_to_the_end_of_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -18,7 +18,7 @@ use nalgebra::DMatrix;
 use petgraph::algo::kosaraju_scc;
 use petgraph::graph::{DiGraph, NodeIndex};
 
-use super::extent::{axes, knows_map, mebibytes};
+use super::extent::{axes, knows_map, mebibytes, sweep_fits};
 use crate::belief::{Belief, BeliefMdp, LevelId};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Then};
@@ -78,9 +78,11 @@ pub(super) fn iterate(
         grid.len(),
         mebibytes(mdp, grid.len() as u64)
     ));
+    let groups = groups_of_levels(mdp);
+    let largest = groups.iter().map(Vec::len).max().unwrap_or(0);
+    sweep_fits(mdp, grid.len(), largest)?;
     let mut policy = GridPolicy::new(mdp.clone(), grid);
     policy.end_episodes();
-    let groups = groups_of_levels(mdp);
     observer.progress("levels", 0, groups.len() as u64);
     for (done, group) in groups.iter().enumerate() {
         policy.solve_group(group, settings)?;
