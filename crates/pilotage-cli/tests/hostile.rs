@@ -400,7 +400,7 @@ fn memory_is_counted_before_it_is_taken() {
         let number = line.strip_prefix("MemAvailable:")?;
         number.split_whitespace().next()?.parse::<u64>().ok()
     });
-    // A fifth of what is free or less for the functions, and more than all of it with three look-ups of 200 bytes a point.
+    // Less than a third of what is free for the functions, and more than all of it with three look-ups of 200 bytes a point.
     let points = free.unwrap() * 1024 / 550;
     let limited = format!(
         "ulimit -v 4000000; '{}' solve corridor --grid {points} --memory {MAX}",
