@@ -306,11 +306,21 @@ fn refused(folder: &Path, arguments: &[&str], says: &str) {
 const MAX: &str = "18446744073709551615";
 
 #[test]
+fn no_verb_starts_a_hundred_thousand_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    for verb in ["solve tiger", "simulate tiger --policy p.json", "reproduce"] {
+        for threads in ["100000", MAX] {
+            let line = format!("{verb} --threads {threads}");
+            let arguments: Vec<&str> = line.split(' ').collect();
+            refused(folder.path(), &arguments, "at most 1024");
+        }
+    }
+}
+
+#[test]
 fn extreme_settings_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let rows: &[(&[&str], &str)] = &[
-        (&["--threads", "100000"], "at most 1024"),
-        (&["--threads", MAX], "at most 1024"),
         (
             &["--with", "policy-search", "--effort", "nan"],
             "error: --effort NaN is no value of it: Factor on the length of all simulations; more than 0, at most 1000, and 1 is the \
@@ -504,6 +514,9 @@ fn streams_that_are_full_or_closed_end_in_an_exit_code() {
         ("pilotage check nowhere 2> >(true)", false),
         ("pilotage solve corridor --seed x 2> /dev/full", false),
         ("pilotage check nowhere > /dev/full 2>&1", false),
+        ("pilotage reproduce --list > /dev/full", false),
+        ("pilotage solve tiger --episodes 10 2> /dev/full", true),
+        ("pilotage solve tiger --episodes 10 2>&-", true),
         ("pilotage check corridor 2> /dev/full", true),
         ("pilotage check corridor 2>&-", true),
         ("pilotage check corridor <&- 2>&-", true),
