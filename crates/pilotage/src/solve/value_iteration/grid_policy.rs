@@ -18,7 +18,7 @@ use nalgebra::DMatrix;
 use petgraph::algo::kosaraju_scc;
 use petgraph::graph::{DiGraph, NodeIndex};
 
-use super::extent::{axes, knows_map, mebibytes, sweep_fits};
+use super::extent::{axes, knows_map, mebibytes};
 use crate::belief::{Belief, BeliefMdp, LevelId};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Then};
@@ -80,7 +80,7 @@ pub(super) fn iterate(
     ));
     let groups = groups_of_levels(mdp);
     let largest = groups.iter().map(Vec::len).max().unwrap_or(0);
-    sweep_fits(mdp, grid.len(), largest)?;
+    super::extent::sweep_fits(mdp, grid.len(), largest)?;
     let mut policy = GridPolicy::new(mdp.clone(), grid);
     policy.end_episodes();
     observer.progress("levels", 0, groups.len() as u64);
