@@ -3,7 +3,7 @@
     python3 scripts/run_policy.py policy.json < readings.csv
 
 Standard input has the readings of a step on a line, comma-separated, in the order of the sensor, each sensed after the action that was printed
-before; a line `start` begins a new episode. Written from docs/policy-format.md, with nothing but Python's standard library.
+before; a line `nothing` says that they are missing, a line `start` begins a new episode. Written from docs/policy-format.md, with nothing but Python's standard library.
 """
 
 import csv
@@ -127,8 +127,19 @@ class Policy:
         first = on_map(x[:2]) if self.map else []
         return first + [bring(v, *ends) for v, ends in zip(x, self.walls["bounds"])][len(first) :]
 
-    def switch(self, when, action):
+    def phase(self):
+        """A, Bu and H of the level's step of the episode."""
+        phases = [self.filter, *self.filter.get("later", [])]
+        return [p for p in phases if p.get("from", 0) <= self.time()][-1]
+
+    def time(self):
+        return self.filter["levels"][self.level].get("time", 0)
+
+    def switch(self, when, action, time):
         for s in self.memory.get("switches", []):
+            first, end = s.get("steps") or (0, None)
+            if not (first <= time and (end is None or time < end)):
+                continue
             inside = True
             for side in s.get("region", []):
                 x, (low, high) = self.mean[side["state"]], side["within"]
@@ -149,23 +160,24 @@ class Policy:
         return distances.index(min(distances))
 
     def update(self, action, reading):
-        becomes = self.switch("before", action)
+        time, phase = self.time(), self.phase()
+        becomes = self.switch("before", action, time)
         step = self.filter["levels"][self.level]["steps"][self.filter["classes"][action]]
-        p = [shift + dot(row, self.mean) for row, shift in zip(self.filter["A"], self.filter["Bu"][action])]
+        p = [shift + dot(row, self.mean) for row, shift in zip(phase["A"], phase["Bu"][action])]
         if self.walls:
             p = self.walled(p, lambda to: self.map.stop(self.mean, to))
         m = p
-        for r, row in enumerate(self.filter["H"]):
+        for r, row in enumerate(phase["H"] if reading else []):
             v = reading[r] - dot(row, p)
             m = [x + k[r] * v for x, k in zip(m, step["gain"])]
         m = [min(max(x, -1e60), 1e60) for x in m]
         self.mean = self.walled(m, lambda to: self.map.confine(to)) if self.walls else m
-        self.level = step["next"]
+        self.level = step["next" if reading else "blind"]
         if "recall" in self.memory:
             recall = self.memory["recall"]
             self.mode = recall["next"][self.mode][action][self.cluster(recall)]
             return
-        becomes = self.switch("after", action) if becomes is None else becomes
+        becomes = self.switch("after", action, time) if becomes is None else becomes
         self.mode = self.mode if becomes is None else becomes
 
     def node(self):
@@ -211,12 +223,14 @@ def main(path):
 
 
 def readings(line, number, count):
+    if line == "nothing":
+        return None
     try:
         reading = [float(x) for x in line.split(",")]
     except ValueError:
         reading = []
     if len(reading) != count or not all(map(math.isfinite, reading)):
-        sys.exit(f"line {number}: `{line}` where {count} numbers belong, or `start`")
+        sys.exit(f"line {number}: `{line}` where {count} numbers belong, `nothing`, or `start`")
     return reading
 
 

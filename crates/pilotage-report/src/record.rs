@@ -6,8 +6,8 @@ use pilotage::error::{Error, Result};
 use pilotage::model::{Interval, ModeId, Model, Region};
 use pilotage::policy::{Automaton, AutomatonRunner};
 use pilotage::scenario::{Scenario, Truth, Walls};
-use pilotage::simulate::{Agent, FilterAgent, run_episode, wake_up};
-use pilotage::world::{ProblemWorld, Streams, World};
+use pilotage::simulate::{Agent, TrackingAgent, run_episode, wake_up};
+use pilotage::world::{Observation, ProblemWorld, Streams, World};
 
 /// Which run to write down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +55,7 @@ pub fn record(
         let mut agent = wake_up::WakeUpAgent::new(mdp, &controller, tracking, choice)?;
         run(mdp, &scenario, automaton, &mut agent, take)
     } else {
-        let mut agent = FilterAgent::new(&automaton.filter, &controller);
+        let mut agent = TrackingAgent::new(&automaton.filter, &controller);
         run(mdp, &scenario, automaton, &mut agent, take)
     };
     let bounds = bounds(model, &frames);
@@ -117,7 +117,7 @@ fn run(
         &mut world,
         agent,
         &mut Streams::new(take.seed, take.episode),
-        &mut vec![0.0; model.observation_dim()],
+        &mut Observation::new(model.observation_dim()),
         (model.episode.length.min(take.most_steps), model.discount),
         &mut |moment, agent| {
             let after = before(moment.state, moment.mode, agent);
@@ -143,7 +143,7 @@ fn believed(mdp: &BeliefMdp, agent: &dyn Agent) -> (usize, Vec<Hypothesis>) {
         mode: mode_name(mdp.model(), belief.mode),
         mean: belief.mean.clone(),
         // A covariance is the same row by row and column by column.
-        covariance: mdp.levels().covariance(belief.level).as_slice().to_vec(),
+        covariance: mdp.covariance(belief.stratum).as_slice().to_vec(),
     });
     (valid, drawn.collect())
 }

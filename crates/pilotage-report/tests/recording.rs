@@ -4,10 +4,10 @@ use pilotage::belief::BeliefMdp;
 use pilotage::policy::AutomatonRunner;
 use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario, Truth};
-use pilotage::simulate::{Agent, FilterAgent, run_episode, wake_up};
+use pilotage::simulate::{Agent, TrackingAgent, run_episode, wake_up};
 use pilotage::solve::value_iteration::Settings;
 use pilotage::solve::{Request, ValueIteration, plan};
-use pilotage::world::{ProblemWorld, Streams};
+use pilotage::world::{Observation, ProblemWorld, Streams};
 use pilotage_report::{Recording, Take, record};
 
 const SEED: u64 = 3;
@@ -22,7 +22,7 @@ fn simulated(scenario: &Scenario, agent: &mut dyn Agent, episode: u64) -> Steps 
         &mut ProblemWorld::new(scenario),
         agent,
         &mut Streams::new(SEED, episode),
-        &mut vec![0.0; model.observation_dim()],
+        &mut Observation::new(model.observation_dim()),
         (model.episode.length, model.discount),
         &mut |moment, _| {
             let action = model.actions[moment.action].name.clone();
@@ -69,7 +69,7 @@ fn recordings_are_the_runs_of_a_simulation() {
                 .expect("several starts");
                 simulated(&scenario, &mut agent, episode)
             } else {
-                let mut agent = FilterAgent::new(&automaton.filter, &controller);
+                let mut agent = TrackingAgent::new(&automaton.filter, &controller);
                 simulated(&scenario, &mut agent, episode)
             };
             for most_steps in [7, usize::MAX] {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use pilotage::belief::{Belief, BeliefMdp, Filter};
+use pilotage::belief::{Belief, BeliefMdp, Filter, Reading};
 use pilotage::error::Result;
 use pilotage::model::{ActionId, Region};
 use pilotage::policy::Policy;
@@ -11,7 +11,7 @@ use pilotage::progress::Progress;
 use pilotage::scenario::Scenario;
 use pilotage::simulate::{Agent, Estimate, Evaluation, Options, evaluate, run_episode};
 use pilotage::solve::value_iteration;
-use pilotage::world::{ProblemWorld, Streams};
+use pilotage::world::{Observation, ProblemWorld, Streams};
 
 /// What somebody earns who knows more than the learner, or does less.
 #[derive(Debug, Clone, PartialEq)]
@@ -132,9 +132,9 @@ fn mode_seen(scenario: &Scenario, policy: &dyn Policy, options: Options) -> Eval
             self.belief.mode = self.mode.load(Ordering::Relaxed);
             self.policy.action(&self.belief)
         }
-        fn observe(&mut self, action: ActionId, observation: &[f64]) {
+        fn observe(&mut self, action: ActionId, reading: Reading<'_>) {
             self.filter
-                .update(&mut self.belief, action, observation, &mut self.scratch);
+                .update(&mut self.belief, action, reading, &mut self.scratch);
         }
         fn belief(&self) -> &Belief {
             &self.belief
@@ -150,7 +150,7 @@ fn mode_seen(scenario: &Scenario, policy: &dyn Policy, options: Options) -> Eval
         mode: mode.clone(),
     };
     let mut world = ProblemWorld::new(scenario);
-    let mut observation = vec![0.0; model.observation_dim()];
+    let mut observation = Observation::new(model.observation_dim());
     let episodes: Vec<_> = (0..options.episodes)
         .map(|episode| {
             let mut draws = Streams::new(options.seed, episode as u64);

@@ -81,13 +81,13 @@ pub fn figures_5_3_and_5_4(context: &Context<'_>) -> Result<Finding> {
     let mdp = BeliefMdp::new(&model);
     let start = mdp.start().clone();
     let east = 0;
-    let class = mdp.levels().class_of(east);
+    let class = mdp.class_of(east);
     let variance = |spread: SpreadFormula| {
         let formulas = Formulas {
             spread,
             ..Formulas::default()
         };
-        let outlook = Outlook::certain(&mdp, start.level);
+        let outlook = Outlook::certain(&mdp, start.stratum);
         formulas
             .next_outlook(&mdp, &outlook, class, false)
             .covariance[(0, 0)]
@@ -101,12 +101,11 @@ pub fn figures_5_3_and_5_4(context: &Context<'_>) -> Result<Finding> {
     let samples = context.either(400_000, 40_000);
     let filter = mdp.filter();
     let deviation = |matrix: &DMatrix<f64>| matrix[(0, 0)].sqrt();
-    let noise = &mdp.levels().classes()[class];
     let (moved, sensed) = (
-        deviation(&noise.motion_noise),
-        deviation(&noise.sensor_noise),
+        deviation(model.motion_noise(east, 0)),
+        deviation(model.sensor_noise(east, 0)),
     );
-    let spread = deviation(mdp.levels().covariance(start.level));
+    let spread = deviation(mdp.covariance(start.stratum));
     let mut rng = stream(context.seed, 0, Role::World);
     let mut scratch = vec![0.0; 1];
     let means: Vec<f64> = (0..samples)
@@ -298,11 +297,10 @@ pub fn figures_5_9_and_5_10(context: &Context<'_>) -> Result<Finding> {
             shown(earned.discounted),
             shown(earned.undiscounted),
         ]);
-        let after_13 = (0..13).try_fold(mdp.start().level, |level, _| {
-            (level < mdp.levels().len())
-                .then(|| mdp.levels().step(level, mdp.levels().class_of(0)).next)
+        let after_13 = (0..13).try_fold(mdp.start().stratum, |level, _| {
+            (level < mdp.strata()).then(|| mdp.levels().step(level, mdp.class_of(0)).next)
         });
-        let variance = after_13.map_or(f64::NAN, |level| mdp.levels().covariance(level)[(0, 0)]);
+        let variance = after_13.map_or(f64::NAN, |level| mdp.covariance(level)[(0, 0)]);
         rows.push([
             reading.to_owned(),
             "variance after 13 listens".to_owned(),

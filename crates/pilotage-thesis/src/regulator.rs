@@ -48,8 +48,8 @@ pub fn tuned(mdp: &BeliefMdp, effort: f64) -> Result<(AutomatonRunner, PoleWeigh
         });
     }
     // Of failures as rare as with little noise no sample tells; with closer limits there are enough.
-    let last = mdp.levels().len() - 1;
-    let steady = mdp.levels().covariance(last);
+    let last = mdp.strata() - 1;
+    let steady = mdp.covariance(last);
     let limits = if steady[(2, 2)] < QUIET { 0.75 } else { 1.0 };
     let runs = Runs::steady(mdp, last, &[0.0; 4]).with_limits(limits);
     let failure = |policy: &AutomatonRunner, count: f64| {

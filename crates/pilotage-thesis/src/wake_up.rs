@@ -1,6 +1,6 @@
 //! Section 5.6: waking up lost.
 
-use pilotage::belief::{Belief, BeliefMdp, Merge, Tracking};
+use pilotage::belief::{Belief, BeliefMdp, HypothesisSettings, Merge};
 use pilotage::policy::Policy;
 use pilotage::simulate::wake_up::{Choice, Settings as Kidnapping, measure};
 use pilotage::solve::value_iteration;
@@ -37,14 +37,14 @@ pub fn table_5_1(context: &Context<'_>) -> Result<Finding> {
         .iter()
         .map(|&(level, name, mean, action)| {
             let belief = Belief {
-                level,
+                stratum: level,
                 mode: 0,
                 mean: mean.to_vec(),
             };
             let ours = &model.actions[policy.action(&belief)].name;
             same += usize::from(ours == action);
             [
-                format!("{:.4}", mdp.levels().covariance(level)[(0, 0)]),
+                format!("{:.4}", mdp.covariance(level)[(0, 0)]),
                 name.to_owned(),
                 format!("({}, {})", mean[0], mean[1]),
                 action.to_owned(),
@@ -84,15 +84,15 @@ pub fn figures_5_16_and_5_17(context: &Context<'_>) -> Result<Finding> {
             format!("{name}: what to do at which mean"),
             belief_map_svg(&mdp, &policy, None)?,
         );
-        let close = Tracking {
+        let close = HypothesisSettings {
             merge: Merge::Agree(1.0),
-            ..Tracking::default()
+            ..HypothesisSettings::default()
         };
         for (rule, choice, tracking) in [
             (
                 "weighted vote, merged when they coincide",
                 Choice::Weighted,
-                Tracking::default(),
+                HypothesisSettings::default(),
             ),
             (
                 "weighted vote, merged when close and agreed",
@@ -102,7 +102,7 @@ pub fn figures_5_16_and_5_17(context: &Context<'_>) -> Result<Finding> {
             (
                 "the valid one, merged when agreed (printed)",
                 Choice::Valid,
-                Tracking::PRINTED,
+                HypothesisSettings::PRINTED,
             ),
         ] {
             let settings = Kidnapping {
@@ -116,7 +116,7 @@ pub fn figures_5_16_and_5_17(context: &Context<'_>) -> Result<Finding> {
                 let count = found.alone_after.get(steps).copied().unwrap_or(0);
                 format!("{:.1} %", 100.0 * count as f64 / episodes as f64)
             };
-            if tracking == Tracking::default() {
+            if tracking == HypothesisSettings::default() {
                 good &= found.ratio.mean > 0.95;
             }
             rows.push([

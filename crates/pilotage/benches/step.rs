@@ -5,10 +5,11 @@
 use divan::{Bencher, black_box};
 use nalgebra::{DMatrix, DVector};
 use pilotage::belief::BeliefMdp;
+use pilotage::belief::Reading;
 use pilotage::policy::{Automaton, AutomatonRunner, Matching, Node, Place};
 use pilotage::progress::Silent;
 use pilotage::scenario;
-use pilotage::simulate::{Agent, FilterAgent};
+use pilotage::simulate::{Agent, TrackingAgent};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::value_iteration;
 
@@ -46,12 +47,15 @@ fn corridor_automaton(bencher: Bencher, matching: &Matching) {
 fn corridor_grid(bencher: Bencher) {
     let policy = corridor();
     let filter = policy.mdp().filter();
-    let mut agent = FilterAgent::new(&filter, &policy);
+    let mut agent = TrackingAgent::new(&filter, &policy);
     let mut time = 0.0;
     bencher.bench_local(|| {
         let action = agent.act();
         time += 0.1_f64;
-        agent.observe(black_box(action), black_box(&[3.5 + time.sin()]));
+        agent.observe(
+            black_box(action),
+            Reading::Values(black_box(&[3.5 + time.sin()])),
+        );
     });
 }
 
@@ -88,7 +92,7 @@ fn synthetic(nodes: usize, matching: Matching) -> Automaton {
                 upper: corner(0.1),
             },
         };
-        let levels = 0..=mdp.levels().len() - 1;
+        let levels = 0..=mdp.strata() - 1;
         automaton
             .nodes
             .push(Node::new(levels, 0, place, k % 2, None));

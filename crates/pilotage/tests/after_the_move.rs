@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used)]
 
 use nalgebra::DVector;
-use pilotage::belief::{Belief, BeliefMdp, Filter, Switch};
-use pilotage::model::{Interval, Region, StartShape, Then, When};
+use pilotage::belief::{Belief, BeliefMdp, Filter, Reading};
+use pilotage::model::{Interval, Region, StartShape, Steps, Switch, Then, When};
 use pilotage::scenario::{self, Scenario, Truth};
-use pilotage::world::{ProblemWorld, Streams, World};
+use pilotage::world::{Observation, ProblemWorld, Streams, World};
 
 fn scenario(name: &str) -> Scenario {
     scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
@@ -36,10 +36,11 @@ fn walk(scenario: &Scenario, plan: &[&str]) -> Vec<(f64, Vec<f64>, usize)> {
     let mut world = ProblemWorld::new(scenario);
     let mut draws = Streams::new(1, 0);
     world.reset(&mut draws);
-    let mut sensed = vec![0.0; model.observation_dim()];
+    let mut sensed = Observation::new(model.observation_dim());
     let step = |name: &&str| {
         let step = world.step(model.action_named(name).unwrap(), &mut draws, &mut sensed);
-        assert_eq!(sensed, world.state(), "noiseless sensors show the place");
+        let shown = Reading::Values(world.state());
+        assert_eq!(sensed.reading(), shown, "noiseless sensors show the place");
         (step.reward, world.state().to_vec(), world.mode())
     };
     plan.iter().map(step).collect()
@@ -121,7 +122,7 @@ fn the_shuttle_moves_the_way_it_faces_and_docks_backwards() {
         [0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 0.0, -10.0, 10.0]
     );
     // The agent's own model has no idea of it.
-    assert_eq!(scenario.model.displacement(0)[0], 0.0);
+    assert_eq!(scenario.model.displacement(0, 0)[0], 0.0);
 }
 
 #[test]
@@ -158,13 +159,13 @@ fn expected_rewards_after_the_move_are_averages_of_the_world() {
     let Scenario { mut model, truth } = scenario("cart-load-unload");
     model.state[0].bounds = Interval::new(-50.0, 50.0);
     let mdp = BeliefMdp::new(&model);
-    let level = mdp.levels().steady(mdp.start().level, 0).unwrap();
+    let level = mdp.levels().steady(mdp.start().stratum, 0).unwrap();
     for (mean, mode, action) in [(1.4, 0, 1), (2.3, 1, 0), (0.4, 0, 0)] {
         let mut start = model.start.clone();
         start[0].shape = StartShape::Normal;
         start[0].mode = mode;
         start[0].mean[0] = mean;
-        start[0].covariance = mdp.levels().covariance(level).clone();
+        start[0].covariance = mdp.covariance(level).clone();
         let there = Scenario {
             model: model.clone(),
             truth: Truth {
@@ -178,7 +179,10 @@ fn expected_rewards_after_the_move_are_averages_of_the_world() {
         for episode in 0..count {
             let mut draws = Streams::new(11, episode);
             world.reset(&mut draws);
-            paid += world.step(action, &mut draws, &mut [0.0]).reward / count as f64;
+            paid += world
+                .step(action, &mut draws, &mut Observation::new(1))
+                .reward
+                / count as f64;
             switched += f64::from(world.mode() != mode) / count as f64;
         }
         let expected = mdp.reward(mode, level, &[mean], action);
@@ -211,13 +215,14 @@ fn a_filter_switches_by_the_mean_before_or_after() {
         mode: Some(0),
         region: Region::new(vec![(0, Interval::new(0.0, 1.0))]),
         when,
+        steps: Steps::ALL,
         becomes: 1,
     };
     let modes = |when: When| -> Vec<usize> {
         let filter = Filter::with_switches(&model, mdp.levels(), mdp.start(), vec![switch(when)]);
         let mut belief = Belief {
             mode: 0,
-            level: 0,
+            stratum: 0,
             mean: vec![1.5],
         };
         let mut modes = Vec::new();
@@ -240,10 +245,10 @@ fn predictions_stop_at_walls() {
     let model = scenario("basic").model;
     let mdp = BeliefMdp::new(&model);
     let filter = mdp.filter();
-    let level = mdp.levels().steady(mdp.start().level, 0).unwrap();
+    let level = mdp.levels().steady(mdp.start().stratum, 0).unwrap();
     let mut belief = Belief {
         mode: 0,
-        level,
+        stratum: level,
         mean: vec![3.9],
     };
     filter.update(&mut belief, 0, &[3.2], &mut [0.0]);

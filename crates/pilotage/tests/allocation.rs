@@ -26,7 +26,7 @@ fn automaton(name: &str, matching: Matching) -> Automaton {
             },
         };
         let action = k as usize % model.actions.len();
-        let levels = 0..=mdp.levels().len() - 1;
+        let levels = 0..=mdp.strata() - 1;
         automaton
             .nodes
             .push(Node::new(levels, 0, place, action, None));

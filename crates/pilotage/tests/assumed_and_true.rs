@@ -113,12 +113,12 @@ fn text_of(scenario: &Scenario, solution: &Solution) -> String {
         Solved::Control(_) => panic!("none of these models has a cost"),
         Solved::Rule { policy, .. } => {
             let model = &scenario.model;
-            let levels = BeliefMdp::new(model).levels().len();
+            let levels = BeliefMdp::new(model).strata();
             let at = |k: usize| {
                 let share = k as f64 / 10.0;
                 let mean = |bounds: pilotage::model::Interval| bounds.low + share * bounds.width();
                 Belief {
-                    level: k % levels,
+                    stratum: k % levels,
                     mode: k % model.modes.len(),
                     mean: model.state.iter().map(|s| mean(s.bounds)).collect(),
                 }

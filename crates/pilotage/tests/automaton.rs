@@ -26,7 +26,7 @@ proptest! {
         let controller = AutomatonRunner::new(&automaton);
         for (level, mode, mean) in beliefs {
             let belief = Belief {
-                level: level % automaton.levels.len(),
+                stratum: level % automaton.levels.len(),
                 mode: mode % automaton.modes.len(),
                 mean: mean[..automaton.states.len()].to_vec(),
             };
@@ -44,7 +44,7 @@ proptest! {
         let controller = AutomatonRunner::new(&automaton);
         for mean in means {
             let mean = mean[..automaton.states.len()].iter().copied().map(f64::from).collect();
-            let belief = Belief { level: 0, mode: 0, mean };
+            let belief = Belief { stratum: 0, mode: 0, mean };
             prop_assert_eq!(controller.action(&belief), automaton.action(&belief));
         }
     }
@@ -148,8 +148,8 @@ proptest! {
                 if pieces.borders.iter().any(|border| (border - mean).abs() < 0.5e-9) {
                     continue;
                 }
-                for level in [0, 1, mdp.levels().len() - 1] {
-                    let belief = Belief { level, mode: 0, mean: vec![mean] };
+                for level in [0, 1, mdp.strata() - 1] {
+                    let belief = Belief { stratum: level, mode: 0, mean: vec![mean] };
                     prop_assert_eq!(
                         automaton.action(&belief), pieces.action(&belief),
                         "{:?} at {}, borders {:?}", matching, mean, inside);

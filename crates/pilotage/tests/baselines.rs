@@ -110,7 +110,7 @@ fn two_nodes_are_the_sign_of_the_command() {
     let mut taken = [0, 0];
     for trial in 0..2000 {
         let belief = Belief {
-            level: trial % mdp.levels().len(),
+            stratum: trial % mdp.strata(),
             mode: 0,
             mean: (0..4).map(|_| 0.1 * normal(&mut rng)).collect(),
         };
@@ -176,7 +176,7 @@ fn in_the_corridor_without_walls_both_are_optimal() {
         let pilotage::solve::Solved::Rule { policy, .. } = &solution.policy else {
             panic!("compiled");
         };
-        for level in 0..mdp.levels().len() {
+        for level in 0..mdp.strata() {
             for (x, action) in [
                 (-1.0, "EAST"),
                 (2.98, "EAST"),
@@ -185,7 +185,7 @@ fn in_the_corridor_without_walls_both_are_optimal() {
                 (4.02, "WEST"),
             ] {
                 let belief = Belief {
-                    level,
+                    stratum: level,
                     mode: 0,
                     mean: vec![x],
                 };
@@ -232,8 +232,8 @@ fn at_the_doors_one_listens_and_the_other_does_not() {
     // Opening is better where 10 p - 100 (1 - p) > 6.5; the log-odds of the doors are 2 m / P.
     let p: f64 = 106.5 / 110.0;
     let border = (p / (1.0 - p)).ln();
-    for level in 0..mdp.levels().len() {
-        let variance = mdp.levels().covariance(level)[0];
+    for level in 0..mdp.strata() {
+        let variance = mdp.covariance(level)[0];
         for (odds, action) in [
             (0.0, "LISTEN"),
             (border - 1e-3, "LISTEN"),
@@ -245,7 +245,7 @@ fn at_the_doors_one_listens_and_the_other_does_not() {
             let odds = if level == 0 { 0.0 } else { odds };
             let action = if level == 0 { "LISTEN" } else { action };
             let belief = Belief {
-                level,
+                stratum: level,
                 mode: 0,
                 mean: vec![0.5 * variance * odds],
             };

@@ -100,10 +100,8 @@ fn the_tiger_sits_behind_one_door_and_does_not_move() {
                 .collect::<Vec<_>>(),
             [(0.5, -1.0), (0.5, 1.0)]
         );
-        assert!(
-            (0..3).all(|action| tiger.displacement(action)[0] == 0.0
-                && tiger.motion_noise(action)[0] == 0.0)
-        );
+        assert!((0..3).all(|action| tiger.displacement(action, 0)[0] == 0.0
+            && tiger.motion_noise(action, 0)[0] == 0.0));
         assert_eq!(reward(&tiger, "OPEN-LEFT", &[-1.0]), -100.0);
         assert_eq!(reward(&tiger, "OPEN-LEFT", &[1.0]), 10.0);
         assert_eq!(reward(&tiger, "OPEN-RIGHT", &[1.0]), -100.0);
@@ -132,7 +130,7 @@ fn step(model: &Model, name: &str, x: f64, mode: usize) -> (f64, f64, usize) {
         .find(|event| event.applies(mode, action) && event.region.contains(&[x]));
     let next = model.state[0]
         .bounds
-        .clamp(x + model.displacement(action)[0]);
+        .clamp(x + model.displacement(action, 0)[0]);
     (
         event.map_or(0.0, |event| event.reward),
         next,

@@ -34,7 +34,7 @@ fn evaluated(scenario: &Scenario, policy: &dyn Policy, episodes: usize) -> Evalu
 
 fn at(level: usize, mean: f64) -> Belief {
     Belief {
-        level,
+        stratum: level,
         mode: 0,
         mean: vec![mean],
     }
@@ -71,7 +71,7 @@ fn the_corridor_without_walls_is_walked_to_its_edges() {
     let model = built_in("corridor-unbounded");
     let policy = plan(&model, None);
     let [east, west, stop] = ["EAST", "WEST", "STOP"].map(|name| model.action_named(name).unwrap());
-    for level in 0..policy.mdp().levels().len() {
+    for level in 0..policy.mdp().strata() {
         let runs: Vec<ActionId> = (-1000..=8000)
             .map(|k| policy.action(&at(level, f64::from(k) / 1000.0)))
             .fold(Vec::new(), |mut runs, action| {
@@ -90,7 +90,7 @@ fn the_corridor_without_walls_is_walked_to_its_edges() {
 #[test]
 fn the_value_is_symmetric_about_the_goal() {
     let policy = plan(&built_in("corridor-unbounded"), None);
-    for level in [0, policy.mdp().levels().len() - 1] {
+    for level in [0, policy.mdp().strata() - 1] {
         for k in 0..40 {
             let offset = f64::from(k) / 10.0;
             let value = |mean| policy.value(&at(level, mean)).unwrap();
@@ -109,14 +109,9 @@ fn the_value_satisfies_the_bellman_equation() {
         let model = built_in(name);
         let policy = plan(&model, None);
         let mdp = policy.mdp();
-        for (level, mean) in [
-            (0, 0.0),
-            (0, 1.3),
-            (2, 3.05),
-            (mdp.levels().len() - 1, 2.713),
-        ] {
+        for (level, mean) in [(0, 0.0), (0, 1.3), (2, 3.05), (mdp.strata() - 1, 2.713)] {
             for action in 0..3 {
-                let step = mdp.levels().step(level, mdp.levels().class_of(action));
+                let step = mdp.levels().step(level, mdp.class_of(action));
                 let sd = step.correction.mean_covariance()[0].sqrt();
                 let centre = mean + model.actions[action].control[0];
                 let expected: f64 = (-400..=400)
@@ -178,7 +173,7 @@ fn the_tiger_is_opened_on_log_odds_of_3_2() {
     let model = built_in("tiger");
     let policy = plan(&model, None);
     for level in 1..8 {
-        let variance = policy.mdp().levels().covariance(level)[0];
+        let variance = policy.mdp().covariance(level)[0];
         let log_odds = |mean: f64| 2.0 * mean / variance;
         let left = log_odds(border(&policy, level, 0.0, 2.4));
         let right = log_odds(border(&policy, level, -2.4, 0.0));
@@ -216,7 +211,7 @@ fn compiled_corridors_decide_as_the_grid_does() {
         };
         let automaton = compile(&policy, policy.mdp(), "value-iteration", &settings).unwrap();
         assert_eq!(automaton.nodes.len(), 3, "{matching:?}");
-        for level in 0..policy.mdp().levels().len() {
+        for level in 0..policy.mdp().strata() {
             assert!((border(&automaton, level, 2.0, 3.5) - 3.0).abs() < 1e-3);
             assert!((border(&automaton, level, 3.5, 5.0) - 4.0).abs() < 1e-3);
         }

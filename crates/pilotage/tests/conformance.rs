@@ -45,14 +45,14 @@ fn beliefs(mdp: &BeliefMdp, modes: usize, rng: &mut Rng) -> Vec<Belief> {
     let model = mdp.model();
     let mut beliefs = Vec::new();
     for mode in 0..modes {
-        for level in 0..mdp.levels().len() {
+        for level in 0..mdp.strata() {
             for _ in 0..20 {
                 let mean = model.state.iter().map(|variable| {
                     let bounds = variable.bounds;
                     0.5 * (bounds.low + bounds.high) + 0.5 * bounds.width() * normal(rng)
                 });
                 beliefs.push(Belief {
-                    level,
+                    stratum: level,
                     mode,
                     mean: mean.collect(),
                 });

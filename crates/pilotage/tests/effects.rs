@@ -8,7 +8,7 @@ use pilotage::model::{
 };
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Estimate;
-use pilotage::world::{ProblemWorld, Streams, World};
+use pilotage::world::{Observation, ProblemWorld, Streams, World};
 use proptest::prelude::*;
 
 fn region() -> impl Strategy<Value = Region> {
@@ -103,9 +103,9 @@ fn worlds_and_beliefs_agree_over_all_models() {
                 let start = mdp.start().clone();
                 let (low, high) = mdp.reward_range();
                 for action in 0..model.actions.len() {
-                    let (reward, outcomes) = mdp.step(mode, start.level, &start.mean, action);
+                    let (reward, outcomes) = mdp.step(mode, start.stratum, &start.mean, action);
                     let mut world = ProblemWorld::new(&Scenario::assumed(&model));
-                    let mut observation = vec![0.0; model.observation_dim()];
+                    let mut observation = Observation::new(model.observation_dim());
                     let steps: Vec<(f64, bool, usize)> = (0..STEPS)
                         .map(|episode| {
                             let mut draws = Streams::new(17, episode);

@@ -100,7 +100,7 @@ fn the_price_of_failing_changes_what_is_done() {
         let policy =
             value_iteration::solve(&mdp, &value_iteration::Settings::default(), &Silent).unwrap();
         policy.action(&Belief {
-            level: mdp.levels().len() - 1,
+            stratum: mdp.strata() - 1,
             mode: 0,
             mean: vec![x],
         })

@@ -140,7 +140,7 @@ fn the_level_graph_gives_the_same_means() {
             filter.update(&mut belief, time, &step.observation, &mut scratch);
             let error = (vector(&belief.mean) - &kalman.mean).amax() / kalman.mean.amax();
             assert!(error <= AGREEMENT, "mean is {error:e} off at step {time}");
-            let level = mdp.levels().covariance(belief.level);
+            let level = mdp.covariance(belief.stratum);
             let error = apart(level, &kalman.covariance) / kalman.covariance.amax();
             assert!(error <= AGREEMENT, "P is {error:e} off at step {time}");
         }
@@ -172,7 +172,7 @@ fn joined_levels_cost_no_more_than_their_tolerance() {
         // An error of 5e-7 in P is one of about 1e-6 in K; innovations here grow with the distance walked, one a step.
         let scale = 1.0 + f64::from(time);
         assert!((belief.mean[0] - kalman.mean[0]).abs() < 5e-6 * scale);
-        assert!((mdp.levels().covariance(belief.level)[0] - kalman.covariance[0]).abs() < 1e-6);
+        assert!((mdp.covariance(belief.stratum)[0] - kalman.covariance[0]).abs() < 1e-6);
     }
 }
 
@@ -198,7 +198,7 @@ fn without_noise_there_is_no_gain() {
     assert_eq!(correction.covariance, zero);
 
     let mdp = BeliefMdp::new(&built_in("load-unload"));
-    assert_eq!(mdp.levels().len(), 1);
+    assert_eq!(mdp.strata(), 1);
     let filter = mdp.filter();
     let mut belief = filter.initial();
     filter.update(&mut belief, 0, &[1e9], &mut [0.0]);
@@ -297,11 +297,11 @@ proptest! {
         model.belief.level_limit = STEPS + 1;
         let mdp = BeliefMdp::new(&model);
         let formulas = Formulas::default();
-        let mut outlook = Outlook::certain(&mdp, mdp.start().level);
+        let mut outlook = Outlook::certain(&mdp, mdp.start().stratum);
         let mut open_loop = system.covariance.clone();
         let mut spread = DMatrix::zeros(system.a.nrows(), system.a.nrows());
         for _ in 0..STEPS {
-            let correction = system.correction(mdp.levels().covariance(outlook.level));
+            let correction = system.correction(mdp.covariance(outlook.level));
             spread = &system.a * spread * system.a.transpose()
                 + &correction.gain * &correction.innovation * correction.gain.transpose();
             open_loop = &system.a * open_loop * system.a.transpose() + &system.q;

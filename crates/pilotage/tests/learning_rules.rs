@@ -14,7 +14,7 @@ fn empty(name: &str, matching: Matching) -> Automaton {
 
 fn belief(level: usize, mean: &[f64]) -> Belief {
     Belief {
-        level,
+        stratum: level,
         mode: 0,
         mean: mean.to_vec(),
     }

@@ -55,7 +55,7 @@ fn the_corridor_converges_to_0_232946() {
     for name in ["corridor", "corridor-unbounded", "corridor-declare"] {
         let mdp = BeliefMdp::new(&built_in(name));
         let steady = mdp.levels().steady(0, 0).unwrap();
-        let covariance = mdp.levels().covariance(steady)[0];
+        let covariance = mdp.covariance(steady)[0];
         assert!((covariance - 0.232946).abs() < 5e-7, "{covariance}");
     }
     let model = built_in("corridor");
@@ -94,9 +94,9 @@ fn the_tiger_has_no_steady_state() {
         assert_eq!(direction.trim_start_matches('-'), "1.000");
 
         let mdp = BeliefMdp::new(&model);
-        for level in 0..mdp.levels().len() - 1 {
+        for level in 0..mdp.strata() - 1 {
             let expected = 1.0 / (1.0 + level as f64 / noise[0]);
-            assert!((mdp.levels().covariance(level)[0] - expected).abs() < 1e-12);
+            assert!((mdp.covariance(level)[0] - expected).abs() < 1e-12);
         }
     }
 }
@@ -217,12 +217,11 @@ fn levels_stay_near_the_true_covariance() {
     for time in 0..10_000_usize {
         let action = (time * time / 7 + time / 3) % 3;
         let class = graph.class_of(action);
-        let noise = &graph.classes()[class];
         exact = Correction::new(
             &model.motion.a,
-            &noise.motion_noise,
+            model.motion_noise(action, 0),
             &model.sensor.h,
-            &noise.sensor_noise,
+            model.sensor_noise(action, 0),
             &exact,
         )
         .covariance;
@@ -337,7 +336,7 @@ fn what_cannot_be_multiplied_is_refused_with_level_and_entry() {
         let model = pilotage::scenario::read(&text.replacen(good, bad, 1), name)
             .unwrap()
             .model;
-        let error = BeliefMdp::new(&model).levels().check(&model).unwrap_err();
+        let error = BeliefMdp::new(&model).check().unwrap_err();
         let message = error.to_string();
         assert!(
             message.contains(says) && message.contains("units"),
@@ -346,7 +345,7 @@ fn what_cannot_be_multiplied_is_refused_with_level_and_entry() {
     }
     for name in pilotage::scenario::names() {
         let model = built_in(name);
-        BeliefMdp::new(&model).levels().check(&model).unwrap();
+        BeliefMdp::new(&model).check().unwrap();
     }
 }
 
@@ -359,7 +358,7 @@ fn many_levels_are_found_fast() {
     let model = pilotage::scenario::read(&text, "many").unwrap().model;
     let clock = std::time::Instant::now();
     let mdp = BeliefMdp::new(&model);
-    assert_eq!(mdp.levels().len(), 100_000);
-    mdp.levels().check(&model).unwrap();
+    assert_eq!(mdp.strata(), 100_000);
+    mdp.check().unwrap();
     assert!(clock.elapsed().as_secs_f64() < 5.0, "{:?}", clock.elapsed());
 }

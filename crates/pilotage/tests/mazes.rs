@@ -11,7 +11,7 @@ use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Options, evaluate};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::value_iteration::{self, GridPolicy};
-use pilotage::world::{ProblemWorld, Streams, World};
+use pilotage::world::{Observation, ProblemWorld, Streams, World};
 
 fn find(name: &str) -> Scenario {
     scenario::find(name).unwrap_or_else(|error| panic!("{error}"))
@@ -39,7 +39,7 @@ fn automaton(mdp: &BeliefMdp, policy: &GridPolicy, episodes: usize) -> Automaton
 fn walk(scenario: &Scenario, seed: u64, plan: &[usize]) -> Vec<Vec<f64>> {
     let mut world = ProblemWorld::new(scenario);
     let mut draws = Streams::new(seed, 0);
-    let mut observation = vec![0.0; scenario.model.observation_dim()];
+    let mut observation = Observation::new(scenario.model.observation_dim());
     world.reset(&mut draws);
     let mut way = vec![world.state().to_vec()];
     for &action in plan {
@@ -116,7 +116,7 @@ fn the_prediction_of_such_a_belief_stops_at_a_wall() {
     let model = mdp.model();
     let east = model.action_named("EAST").unwrap();
     let belief = Belief {
-        level: 0,
+        stratum: 0,
         mode: 0,
         mean: vec![1.5, 2.5],
     };
@@ -187,7 +187,7 @@ fn corridor_walls_is_the_corridor_with_another_belief() {
 #[test]
 fn the_unbounded_maze_has_three_levels_and_its_known_value() {
     let policy = unbounded();
-    assert_eq!(policy.mdp().levels().len(), 3);
+    assert_eq!(policy.mdp().strata(), 3);
     let value = policy.start_value();
     assert!((value - 0.26230).abs() < 0.001, "{value}");
     // The two directions are equally far from the goal: the value is symmetric about the diagonal through it.
@@ -196,7 +196,7 @@ fn the_unbounded_maze_has_three_levels_and_its_known_value() {
             let mean = vec![x, y];
             policy
                 .value(&Belief {
-                    level: 1,
+                    stratum: 1,
                     mode: 0,
                     mean,
                 })
@@ -276,12 +276,12 @@ fn the_way_from_the_start_of_the_maze_is_south_and_east() {
 fn away_from_the_goal_no_belief_goes_north_or_west() {
     let (policy, mdp) = (unbounded(), unbounded().mdp());
     let model = mdp.model();
-    for level in 0..mdp.levels().len() {
+    for level in 0..mdp.strata() {
         for i in 0..30 {
             for j in 0..30 {
                 let mean = vec![f64::from(i) * 0.1, 1.1 + f64::from(j) * 0.1];
                 let belief = Belief {
-                    level,
+                    stratum: level,
                     mode: 0,
                     mean,
                 };

@@ -65,8 +65,8 @@ fn by_prediction(model: &Model, mean: f64, variance: f64, horizon: usize) -> Vec
         let rewards = model.rewards.iter().filter(|term| term.applies(0, action));
         let reward = rewards.map(|term| term.value * probability(mean, variance, &term.region));
         let next = (
-            model.motion.a[0] * mean + model.displacement(action)[0],
-            model.motion.a[0].powi(2) * variance + model.motion_noise(action)[0],
+            model.motion.a[0] * mean + model.displacement(action, 0)[0],
+            model.motion.a[0].powi(2) * variance + model.motion_noise(action, 0)[0],
         );
         let goes_on = model.actions[action].then == Then::Continue;
         (reward.sum(), goes_on.then_some(next))
@@ -81,15 +81,15 @@ fn by_formulas(mdp: &BeliefMdp, formulas: Formulas, mean: f64, horizon: usize) -
     let step = |(mean, outlook): &(f64, Outlook), action: usize| {
         let at = nalgebra::DVector::from_element(1, *mean);
         let reward = formulas.reward(mdp, 0, outlook, &at, action);
-        let class = mdp.levels().class_of(action);
+        let class = mdp.class_of(action);
         let next = (
-            model.motion.a[0] * mean + model.displacement(action)[0],
+            model.motion.a[0] * mean + model.displacement(action, 0)[0],
             formulas.next_outlook(mdp, outlook, class, false),
         );
         let goes_on = model.actions[action].then == Then::Continue;
         (reward, goes_on.then_some(next))
     };
-    let outlook = Outlook::certain(mdp, mdp.start().level);
+    let outlook = Outlook::certain(mdp, mdp.start().stratum);
     let actions = model.actions.len();
     all_sequences(actions, model.discount, horizon, &(mean, outlook), &step)
 }
@@ -163,7 +163,7 @@ fn the_search_plans_loads_and_unloads() {
     let mdp = BeliefMdp::new(&model);
     let bounds = model.state[0].bounds;
     let step = |&(x, loaded): &(f64, bool), action: usize| {
-        let moved = bounds.clamp(x + model.displacement(action)[0]);
+        let moved = bounds.clamp(x + model.displacement(action, 0)[0]);
         match model.actions[action].name.as_str() {
             "LOAD" if !loaded && x < 1.0 => (1.0, Some((x, true))),
             "UNLOAD" if loaded && x >= 4.0 => (1.0, Some((x, false))),

@@ -16,7 +16,7 @@ use pilotage::solve::{
     Course, Entry, Form, Learned, Learner, Learning, Lesson, Owner, Plan, Planner, Problem,
     Registry, Request, Run, Settings, Solution, Worlds, run_course, solve,
 };
-use pilotage::world::{Streams, World};
+use pilotage::world::{Observation, Streams, World};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -167,7 +167,7 @@ impl Course for Trials<'_> {
             return Ok(ControlFlow::Break(()));
         }
         let mut world = (self.worlds)();
-        let mut observation = vec![0.0; model.observation_dim()];
+        let mut observation = Observation::new(model.observation_dim());
         let mut sum = 0.0;
         for episode in 0..self.settings.episodes as u64 {
             let mut draws = Streams::new(self.settings.seed, episode);
@@ -188,7 +188,7 @@ impl Course for Trials<'_> {
         let mdp = self.problem.mdp();
         let mut automaton = Automaton::new(mdp, "bandit", Matching::Nearest);
         let place = Place::Point(vec![0.0; mdp.model().state_dim()]);
-        let levels = 0..=mdp.levels().len() - 1;
+        let levels = 0..=mdp.strata() - 1;
         let action = best.map_or(0, |(action, _)| action);
         automaton
             .nodes

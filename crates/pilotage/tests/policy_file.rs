@@ -716,7 +716,7 @@ fn runs(automaton: &Automaton) {
         controller.observe(action, &vec![reading; automaton.filter.readings()]);
         let belief = controller.belief();
         assert!(belief.mean.iter().all(|m| m.abs() <= LARGEST), "{belief:?}");
-        assert!(belief.level < automaton.levels.len() && belief.mode < automaton.modes.len());
+        assert!(belief.stratum < automaton.levels.len() && belief.mode < automaton.modes.len());
     }
 }
 

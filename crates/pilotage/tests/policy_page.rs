@@ -17,7 +17,7 @@ use pilotage::progress::Silent;
 use pilotage::random::{Role, normal, stream};
 use pilotage::scenario::Scenario;
 use pilotage::solve::{Arkaq, Form, Kafaq, PolicySearch, Registry, Request, Solver, solve};
-use pilotage::world::{ProblemWorld, Streams, World};
+use pilotage::world::{Observation, ProblemWorld, Streams, World};
 use proptest::prelude::*;
 
 fn root() -> PathBuf {
@@ -53,7 +53,7 @@ fn run(automaton: &Automaton, events: &[Event]) -> Vec<Row> {
     let row = |controller: &AutomatonRunner| {
         let (belief, (node, action)) = (controller.belief(), controller.decide());
         let row = Row {
-            level: belief.level,
+            level: belief.stratum,
             mode: belief.mode,
             mean: belief.mean.clone(),
             node,
@@ -156,7 +156,7 @@ fn events(scenario: &Scenario, automaton: &Automaton, steps: usize) -> Vec<Event
     let mut world = ProblemWorld::new(scenario);
     let mut controller = AutomatonRunner::new(automaton);
     let mut draws = Streams::new(4, 0);
-    let mut observation = vec![0.0; automaton.filter.readings()];
+    let mut observation = Observation::new(automaton.filter.readings());
     world.reset(&mut draws);
     let mut events = Vec::new();
     let mut age = 0;
@@ -173,8 +173,8 @@ fn events(scenario: &Scenario, automaton: &Automaton, steps: usize) -> Vec<Event
             controller.reset();
             events.push(None);
         } else {
-            controller.observe(action, &observation);
-            events.push(Some(observation.clone()));
+            controller.observe(action, observation.reading());
+            events.push(Some(observation.reading().values().unwrap().to_vec()));
         }
     }
     events

@@ -8,7 +8,7 @@ use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario, Simulator, Walls};
 use pilotage::simulate::{Options, evaluate};
 use pilotage::solve::kafaq::{Settings, learn};
-use pilotage::world::{ProblemWorld, Streams, World};
+use pilotage::world::{Observation, ProblemWorld, Streams, World};
 
 const PROBLEMS: [&str; 3] = ["basic", "maze-4x4", "cart-load-unload"];
 
@@ -43,11 +43,12 @@ fn the_robot_senses_as_well_as_the_agent_assumes() {
     let mut world = ProblemWorld::new(&robot);
     let mut draws = Streams::new(4, 0);
     let (mut square, mut count) = (0.0, 0.0);
-    let mut reading = [0.0; 2];
+    let mut observation = Observation::new(2);
     for episode in 0..50 {
         world.reset(&mut draws);
         for step in 0..50 {
-            world.step((episode + step * 7) % 4, &mut draws, &mut reading);
+            world.step((episode + step * 7) % 4, &mut draws, &mut observation);
+            let reading = observation.reading().values().unwrap();
             for (sensed, place) in reading.iter().zip(world.state()) {
                 square += (sensed - place).powi(2);
                 count += 1.0;

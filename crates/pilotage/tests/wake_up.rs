@@ -3,7 +3,9 @@
 
 use std::sync::OnceLock;
 
-use pilotage::belief::{Belief, BeliefMdp, Merge, Tracker, Tracking};
+use pilotage::belief::{
+    Belief, BeliefMdp, HypothesisSettings, HypothesisTracker, Merge, Reading, Tracker,
+};
 use pilotage::model::ActionId;
 use pilotage::policy::Policy;
 use pilotage::progress::Silent;
@@ -47,8 +49,12 @@ impl Policy for Split {
     }
 }
 
-fn tracking(prune: f64, merge: Merge) -> Tracking {
-    Tracking { prune, merge }
+fn all_alike(_: &Belief, _: &Belief) -> bool {
+    true
+}
+
+fn tracking(prune: f64, merge: Merge) -> HypothesisSettings {
+    HypothesisSettings { prune, merge }
 }
 
 /// Starts (0.5, 0.5) and (2.5, 0.5), action NORTH, and an observation on the line between them: with S = 0.3 + 0.45 + 0.45 = 1.2 in both
@@ -56,15 +62,15 @@ fn tracking(prune: f64, merge: Merge) -> Tracking {
 #[test]
 fn weights_follow_the_density_of_each_innovation() {
     let mdp = mdp("n-maze");
-    let mut tracker = Tracker::new(&mdp, tracking(0.0, Merge::Never)).unwrap();
+    let mut tracker = HypothesisTracker::new(&mdp, tracking(0.0, Merge::Never), all_alike).unwrap();
     let north = mdp.model().action_named("NORTH").unwrap();
-    tracker.update(north, &[1.2, 1.5], &Always(0));
+    tracker.update(north, Reading::Values(&[1.2, 1.5]));
     let weights: Vec<f64> = tracker.hypotheses().iter().map(|h| h.weight).collect();
     let odds = ((1.3_f64.powi(2) - 0.7_f64.powi(2)) / 2.4).exp();
     assert!((weights[0] / weights[1] - odds).abs() < 1e-9, "{weights:?}");
     assert!((weights[0] + weights[1] - 1.0).abs() < 1e-12);
     // Far from both, where every density underflows, the nearer one still wins.
-    tracker.update(north, &[900.0, 0.0], &Always(0));
+    tracker.update(north, Reading::Values(&[900.0, 0.0]));
     let weights: Vec<f64> = tracker.hypotheses().iter().map(|h| h.weight).collect();
     assert!(
         weights.iter().all(|w| w.is_finite()) && weights[1] > 0.999,
@@ -75,7 +81,7 @@ fn weights_follow_the_density_of_each_innovation() {
 #[test]
 fn each_hypothesis_is_the_filter_that_started_there() {
     let mdp = mdp("u-maze");
-    let mut tracker = Tracker::new(&mdp, tracking(0.0, Merge::Never)).unwrap();
+    let mut tracker = HypothesisTracker::new(&mdp, tracking(0.0, Merge::Never), all_alike).unwrap();
     let filters: Vec<_> = mdp
         .starts()
         .iter()
@@ -83,10 +89,10 @@ fn each_hypothesis_is_the_filter_that_started_there() {
         .collect();
     let mut beliefs: Vec<Belief> = filters.iter().map(|filter| filter.initial()).collect();
     let mut scratch = vec![0.0; 2];
-    for t in 0..12 {
+    for t in 0..12_u8 {
         let observation = [1.0 + 0.3 * f64::from(t), 0.4 + 0.1 * f64::from(t)];
-        let action = t as usize % 4;
-        tracker.update(action, &observation, &Always(0));
+        let action = usize::from(t) % 4;
+        tracker.update(action, Reading::Values(&observation));
         for (filter, belief) in filters.iter().zip(&mut beliefs) {
             filter.update(belief, action, &observation, &mut scratch);
         }
@@ -102,13 +108,14 @@ fn each_hypothesis_is_the_filter_that_started_there() {
 #[test]
 fn light_hypotheses_are_pruned_and_the_heaviest_never() {
     let mdp = mdp("u-maze");
-    let mut tracker = Tracker::new(&mdp, tracking(0.05, Merge::Never)).unwrap();
+    let mut tracker =
+        HypothesisTracker::new(&mdp, tracking(0.05, Merge::Never), all_alike).unwrap();
     let south = mdp.model().action_named("SOUTH").unwrap();
-    tracker.update(south, &[-3.0, 0.5], &Always(0));
+    tracker.update(south, Reading::Values(&[-3.0, 0.5]));
     let left = tracker.hypotheses();
     assert_eq!((left.len(), left[0].origin, left[0].weight), (1, 0, 1.0));
-    let mut tracker = Tracker::new(&mdp, tracking(0.9, Merge::Never)).unwrap();
-    tracker.update(south, &[2.1, 0.5], &Always(0));
+    let mut tracker = HypothesisTracker::new(&mdp, tracking(0.9, Merge::Never), all_alike).unwrap();
+    tracker.update(south, Reading::Values(&[2.1, 0.5]));
     assert_eq!(tracker.hypotheses().len(), 1);
     tracker.reset();
     assert_eq!(tracker.hypotheses(), tracker.starts());
@@ -118,8 +125,9 @@ fn light_hypotheses_are_pruned_and_the_heaviest_never() {
 fn hypotheses_merge_by_the_rule_asked_for() {
     let mdp = mdp("n-maze");
     let left = |merge: Merge, policy: &dyn Policy| {
-        let mut tracker = Tracker::new(&mdp, tracking(0.0, merge)).unwrap();
-        tracker.update(0, &[1.2, 1.5], policy);
+        let alike = |a: &Belief, b: &Belief| policy.action(a) == policy.action(b);
+        let mut tracker = HypothesisTracker::new(&mdp, tracking(0.0, merge), alike).unwrap();
+        tracker.update(0, Reading::Values(&[1.2, 1.5]));
         let total: f64 = tracker.hypotheses().iter().map(|h| h.weight).sum();
         assert!((total - 1.0).abs() < 1e-12);
         (tracker.hypotheses().len(), tracker.hypotheses()[0].origin)
@@ -151,7 +159,7 @@ fn the_agent_first_believes_the_farthest_start_and_then_the_heaviest() {
         south,
         "\"the agent always chooses SOUTH\" (5.6.1.2)"
     );
-    agent.observe(south, &[5.0, 0.0]);
+    agent.observe(south, Reading::Values(&[5.0, 0.0]));
     let heaviest = agent.tracker().heaviest().clone();
     assert!(agent.tracker().hypotheses().iter().all(|h| h.origin != 0));
     assert_eq!(agent.belief(), &heaviest.belief);
@@ -162,7 +170,7 @@ fn the_agent_first_believes_the_farthest_start_and_then_the_heaviest() {
     );
 }
 
-fn wake_up(name: &str, choice: Choice, tracking: Tracking) -> WakeUp {
+fn wake_up(name: &str, choice: Choice, tracking: HypothesisSettings) -> WakeUp {
     let scenario = scenario(name);
     let mdp = BeliefMdp::new(&scenario.model);
     let settings = Settings {
@@ -179,9 +187,9 @@ fn wake_up(name: &str, choice: Choice, tracking: Tracking) -> WakeUp {
 #[test]
 fn the_lost_robot_arrives_almost_as_often_as_one_that_knows_where_it_is() {
     for (name, tracking) in [
-        ("n-maze", Tracking::default()),
-        ("u-maze", Tracking::default()),
-        ("n-maze", Tracking::PRINTED),
+        ("n-maze", HypothesisSettings::default()),
+        ("u-maze", HypothesisSettings::default()),
+        ("n-maze", HypothesisSettings::PRINTED),
     ] {
         let found = wake_up(name, Choice::Valid, tracking);
         assert!(
@@ -199,7 +207,7 @@ fn the_lost_robot_arrives_almost_as_often_as_one_that_knows_where_it_is() {
 /// alone a minority of runs would.
 #[test]
 fn in_the_n_one_hypothesis_is_left_after_the_first_step_by_merging_and_not_by_weight() {
-    let printed = wake_up("n-maze", Choice::Valid, Tracking::PRINTED);
+    let printed = wake_up("n-maze", Choice::Valid, HypothesisSettings::PRINTED);
     let weight = wake_up("n-maze", Choice::Valid, tracking(0.05, Merge::Never));
     let first = |found: &WakeUp| found.alone_after[1] as f64 / found.episodes as f64;
     assert!(first(&printed) > 0.9, "{printed:?}");
@@ -208,7 +216,7 @@ fn in_the_n_one_hypothesis_is_left_after_the_first_step_by_merging_and_not_by_we
 
 #[test]
 fn only_what_can_be_woken_up_is() {
-    let one = Tracker::new(&mdp("corridor"), Tracking::default())
+    let one = HypothesisTracker::new(&mdp("corridor"), HypothesisSettings::default(), all_alike)
         .map(drop)
         .unwrap_err();
     let text = one.to_string();
@@ -216,7 +224,7 @@ fn only_what_can_be_woken_up_is() {
         text.contains("wake-up does not accept corridor") && text.contains("one start"),
         "{text}"
     );
-    let collapsed = Tracker::new(&mdp("tiger"), Tracking::default())
+    let collapsed = HypothesisTracker::new(&mdp("tiger"), HypothesisSettings::default(), all_alike)
         .map(drop)
         .unwrap_err();
     assert!(
@@ -231,7 +239,9 @@ fn only_what_can_be_woken_up_is() {
         tracking(0.05, Merge::Agree(-1.0)),
         tracking(0.05, Merge::Coincide(f64::NAN)),
     ] {
-        let error = Tracker::new(&maze, wrong).map(drop).unwrap_err();
+        let error = HypothesisTracker::new(&maze, wrong, all_alike)
+            .map(drop)
+            .unwrap_err();
         assert!(error.to_string().contains("out of range"), "{error}");
     }
     let none = Settings {

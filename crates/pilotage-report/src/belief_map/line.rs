@@ -6,7 +6,7 @@ use crate::palette::Paint;
 use crate::plot::{Scale, figure};
 use crate::sheet::{MARGIN, Sign, TINT, diamond};
 use crate::svg::{self, Anchor, Element, label};
-use pilotage::belief::{Belief, LevelId};
+use pilotage::belief::{Belief, StratumId};
 use pilotage::model::{ActionId, ModeId};
 use pilotage::policy::{Matching, Node, Place};
 
@@ -63,9 +63,9 @@ pub fn draw(map: &Map<'_>) -> String {
 }
 
 /// Levels from the least to the most certain; with an automaton, those it has nodes at and the start.
-fn shown_levels(map: &Map<'_>) -> Vec<LevelId> {
-    let start = map.mdp.start().level;
-    let is_met = |level: LevelId| {
+fn shown_levels(map: &Map<'_>) -> Vec<StratumId> {
+    let start = map.mdp.start().stratum;
+    let is_met = |level: StratumId| {
         map.automaton.is_none_or(|automaton| {
             let mut bands = automaton.nodes.iter().map(|node| node.levels);
             level == start || bands.any(|(first, last)| first <= level && level <= last)
@@ -76,8 +76,8 @@ fn shown_levels(map: &Map<'_>) -> Vec<LevelId> {
     levels
 }
 
-fn what(map: &Map<'_>, shown: &[LevelId]) -> String {
-    let total = map.mdp.levels().len();
+fn what(map: &Map<'_>, shown: &[StratumId]) -> String {
+    let total = map.mdp.strata();
     let levels = match (shown.len(), total) {
         (_, 1) => "there is one level.".to_owned(),
         (all, total) if all == total => {
@@ -94,7 +94,7 @@ struct Panel<'a> {
     map: &'a Map<'a>,
     mode: ModeId,
     /// From top to bottom.
-    levels: &'a [LevelId],
+    levels: &'a [StratumId],
     x: Scale,
     /// Counts rows from the top.
     y: Scale,
@@ -144,15 +144,15 @@ impl Panel<'_> {
             .children(areas)
     }
 
-    fn action(&self, level: LevelId, mean: f64) -> ActionId {
+    fn action(&self, level: StratumId, mean: f64) -> ActionId {
         self.map.policy.action(&Belief {
-            level,
+            stratum: level,
             mode: self.mode,
             mean: vec![mean],
         })
     }
 
-    fn runs(&self, level: LevelId) -> Vec<Run> {
+    fn runs(&self, level: StratumId) -> Vec<Run> {
         const BISECTIONS: usize = 12;
         let (low, high) = self.x.data;
         let at = |k: usize| low + (high - low) * k as f64 / SAMPLES as f64;
@@ -259,7 +259,7 @@ impl Panel<'_> {
 
     /// Rows of a node's levels that lie together, as top and bottom on paper.
     fn rows(&self, node: &Node) -> Vec<(f64, f64)> {
-        let holds = |level: LevelId| node.levels.0 <= level && level <= node.levels.1;
+        let holds = |level: StratumId| node.levels.0 <= level && level <= node.levels.1;
         let rows: Vec<usize> = (0..self.levels.len())
             .filter(|&row| holds(self.levels[row]))
             .collect();
@@ -315,7 +315,7 @@ impl Panel<'_> {
             .nodes(self.mode)
             .filter(|node| matches!(node.place, Place::Point(_)))
             .collect();
-        let mut bands: Vec<(LevelId, LevelId)> = nodes.iter().map(|node| node.levels).collect();
+        let mut bands: Vec<(StratumId, StratumId)> = nodes.iter().map(|node| node.levels).collect();
         bands.sort_unstable();
         bands.dedup();
         let stroke = |element: Element| element.stroke(Paint::Ink, 1.0);
@@ -345,7 +345,10 @@ impl Panel<'_> {
 
     fn start(&self) -> Option<Element> {
         let start = self.map.mdp.start();
-        let row = self.levels.iter().position(|&level| level == start.level)?;
+        let row = self
+            .levels
+            .iter()
+            .position(|&level| level == start.stratum)?;
         let place = (self.x.clamped(start.mean[0]), self.y.at(row as f64 + 0.5));
         (self.map.start_mode() == self.mode).then(|| diamond(place))
     }

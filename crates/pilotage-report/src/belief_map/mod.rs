@@ -11,7 +11,7 @@ use super::is_sound;
 use super::palette::Paint;
 use super::plot::figure;
 use super::sheet::{Sheet, Sign};
-use pilotage::belief::{BeliefMdp, LevelId};
+use pilotage::belief::{BeliefMdp, StratumId};
 use pilotage::error::{Error, Result};
 use pilotage::model::{Interval, ModeId, Region};
 use pilotage::policy::{Automaton, Node, Place, Policy};
@@ -54,7 +54,7 @@ fn check(mdp: &BeliefMdp, automaton: &Automaton) -> Result<()> {
     let (n, model) = (mdp.model().state_dim(), mdp.model());
     let fits = automaton.nodes.iter().all(|node| {
         is_sound(&node.place, n)
-            && node.levels.1 < mdp.levels().len()
+            && node.levels.1 < mdp.strata()
             && node.mode < automaton.modes.len()
             && node.action < model.actions.len()
     });
@@ -108,7 +108,7 @@ impl Map<'_> {
     fn extent(&self, variable: usize) -> (f64, f64) {
         let model = self.mdp.model();
         let start = self.mdp.start();
-        let deviation = self.mdp.levels().covariance(start.level)[(variable, variable)].sqrt();
+        let deviation = self.mdp.covariance(start.stratum)[(variable, variable)].sqrt();
         let mean = start.mean[variable];
         let Interval { low, high } = model.state[variable].bounds;
         let around = 4.0 * deviation.max(0.25 * mean.abs()).max(1e-3);
@@ -137,9 +137,9 @@ impl Map<'_> {
     }
 
     /// Levels from the least to the most certain.
-    fn ordered_levels(&self) -> Vec<LevelId> {
+    fn ordered_levels(&self) -> Vec<StratumId> {
         let levels = self.mdp.levels();
-        let mut ids: Vec<LevelId> = (0..levels.len()).collect();
+        let mut ids: Vec<StratumId> = (0..levels.len()).collect();
         ids.sort_by(|&a, &b| {
             levels
                 .covariance(b)
@@ -151,22 +151,22 @@ impl Map<'_> {
     }
 
     /// The level that repeats itself, or where there is none the most certain.
-    fn steady_level(&self) -> LevelId {
-        let steady = self.mdp.levels().steady(self.mdp.start().level, 0);
+    fn steady_level(&self) -> StratumId {
+        let steady = self.mdp.levels().steady(self.mdp.start().stratum, 0);
         steady
             .or_else(|| self.ordered_levels().last().copied())
             .unwrap_or(0)
     }
 
     /// Standard deviation of a variable at a level.
-    fn deviation(&self, level: LevelId, variable: usize) -> f64 {
-        self.mdp.levels().covariance(level)[(variable, variable)]
+    fn deviation(&self, level: StratumId, variable: usize) -> f64 {
+        self.mdp.covariance(level)[(variable, variable)]
             .max(0.0)
             .sqrt()
     }
 
     /// "σ = 0.48", or one for each of the variables where they differ.
-    fn deviations(&self, level: LevelId, variables: &[usize]) -> String {
+    fn deviations(&self, level: StratumId, variables: &[usize]) -> String {
         let figures: Vec<String> = variables
             .iter()
             .map(|&variable| figure(self.deviation(level, variable)))

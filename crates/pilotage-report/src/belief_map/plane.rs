@@ -9,7 +9,7 @@ use crate::palette::Paint;
 use crate::plot::{Scale, figure};
 use crate::sheet::{MARGIN, Sign, TINT, diamond};
 use crate::svg::{self, Anchor, Element, label, number};
-use pilotage::belief::{Belief, LevelId};
+use pilotage::belief::{Belief, StratumId};
 use pilotage::model::{ModeId, Region};
 use pilotage::policy::{Automaton, Matching, Node, Place};
 
@@ -26,7 +26,7 @@ const SAMPLES: usize = 150;
 pub fn draw(map: &Map<'_>) -> String {
     let plane = Plane::new(map);
     let modes = map.modes();
-    let panels: Vec<(ModeId, LevelId)> = modes
+    let panels: Vec<(ModeId, StratumId)> = modes
         .iter()
         .flat_map(|&mode| plane.levels.iter().map(move |&level| (mode, level)))
         .collect();
@@ -84,7 +84,7 @@ struct Plane<'a> {
     across: usize,
     up: usize,
     extent: ((f64, f64), (f64, f64)),
-    levels: Vec<LevelId>,
+    levels: Vec<StratumId>,
 }
 
 impl<'a> Plane<'a> {
@@ -125,7 +125,7 @@ impl<'a> Plane<'a> {
     fn caption(&self) -> String {
         let states = &self.map.mdp.model().state;
         let (across, up) = (&states[self.across].name, &states[self.up].name);
-        let total = self.map.mdp.levels().len();
+        let total = self.map.mdp.strata();
         if states.len() == 2 {
             let shown = self.levels.len();
             let of = if shown < total {
@@ -148,11 +148,15 @@ impl<'a> Plane<'a> {
         )
     }
 
-    fn belief(&self, level: LevelId, mode: ModeId, (x, y): (f64, f64)) -> Belief {
+    fn belief(&self, level: StratumId, mode: ModeId, (x, y): (f64, f64)) -> Belief {
         let mut mean = self.map.mdp.start().mean.clone();
         mean[self.across] = x;
         mean[self.up] = y;
-        Belief { level, mode, mean }
+        Belief {
+            stratum: level,
+            mode,
+            mean,
+        }
     }
 
     /// Squared distance of a place from the plane, in the automaton's scale.
@@ -197,7 +201,7 @@ fn most_uncertain(map: &Map<'_>) -> (usize, usize) {
 }
 
 /// The least and the most certain level and some between.
-fn chosen_levels(map: &Map<'_>) -> Vec<LevelId> {
+fn chosen_levels(map: &Map<'_>) -> Vec<StratumId> {
     let ordered = map.ordered_levels();
     let count = ordered.len().min(MOST_LEVELS);
     let last = ordered.len() - 1;
@@ -209,7 +213,7 @@ fn chosen_levels(map: &Map<'_>) -> Vec<LevelId> {
 struct Panel<'a> {
     plane: &'a Plane<'a>,
     mode: ModeId,
-    level: LevelId,
+    level: StratumId,
     x: Scale,
     y: Scale,
 }
@@ -447,7 +451,7 @@ impl Panel<'_> {
 
     fn start(&self) -> Option<Element> {
         let start = self.plane.map.mdp.start();
-        let here = self.plane.map.start_mode() == self.mode && start.level == self.level;
+        let here = self.plane.map.start_mode() == self.mode && start.stratum == self.level;
         here.then(|| {
             diamond(self.point((start.mean[self.plane.across], start.mean[self.plane.up])))
         })

@@ -1,8 +1,11 @@
-//! The filter as it runs: a belief is a level and a mean, its update two small matrix-vector products.
+//! The filter as it runs: a belief is an uncertainty level and a mean, its update two small matrix-vector products.
 
-use super::levels::{LevelGraph, LevelId};
+use nalgebra::DMatrix;
+
+use super::levels::{LevelGraph, StratumId};
 use super::recall::Recall;
-use crate::model::{ActionId, Barriers, ModeId, Model, Region, WallBelief, When};
+use super::tracker::Reading;
+use crate::model::{ActionId, Barriers, ModeId, Model, Switch, WallBelief, When};
 
 /// Largest magnitude of a mean, and of any number of a policy.
 ///
@@ -19,44 +22,18 @@ pub(crate) fn is_kept(mean: &[f64]) -> bool {
 /// What the agent knows: an uncertainty level, the mean at that level, and the hidden mode it takes to be the case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Belief {
-    /// Uncertainty level.
-    pub level: LevelId,
+    /// Everything else: for a linear model, the uncertainty level.
+    pub stratum: StratumId,
     /// Hidden mode (or memory).
     pub mode: ModeId,
     /// Mean, length `n`.
     pub mean: Vec<f64>,
 }
 
-/// A change of mode that the agent infers from its own action and belief.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Switch {
-    /// Actions it happens on; `None` for all.
-    pub actions: Option<Vec<ActionId>>,
-    /// Mode it happens in; `None` for any.
-    pub mode: Option<ModeId>,
-    /// Where the mean must be.
-    pub region: Region,
-    /// Whether it must be there when the action is taken, or once what it brought has been sensed. Changes before come first.
-    pub when: When,
-    /// Mode afterwards.
-    pub becomes: ModeId,
-}
-
-impl Switch {
-    fn happens(&self, when: When, belief: &Belief, action: ActionId) -> bool {
-        self.when == when
-            && self.mode.is_none_or(|mode| mode == belief.mode)
-            && self
-                .actions
-                .as_ref()
-                .is_none_or(|actions| actions.contains(&action))
-            && self.region.contains(&belief.mean)
-    }
-}
-
 /// Everything the update needs, in flat arrays; an update allocates nothing.
 ///
-/// The mean is predicted, `m- = A m + B u`, and corrected, `m = m- + K (o - H m-)`, with the gain of the step of the level graph.
+/// The mean is predicted, `m- = A m + B u`, and corrected, `m = m- + K (o - H m-)`, with the gain of the step of the level graph; where
+/// the reading is missing the prediction stands.
 /// Where the belief knows of walls, the prediction stops at them and the corrected mean is kept where a state can be.
 ///
 /// A mean never leaves [`LARGEST`]; as long as no reading does either, and none of the filter's numbers, it stays finite.
@@ -65,16 +42,24 @@ pub struct Filter {
     pub(crate) states: usize,
     pub(crate) readings: usize,
     /// Start level, mode and mean.
-    pub(crate) start: (LevelId, ModeId, Vec<f64>),
+    pub(crate) start: (StratumId, ModeId, Vec<f64>),
     /// Per level and action: next level.
-    pub(crate) next: Vec<LevelId>,
+    pub(crate) next: Vec<StratumId>,
+    /// Per level and action: next level where the reading is missing.
+    pub(crate) blind: Vec<StratumId>,
     /// Per level and action: `K`, column by column.
     pub(crate) gains: Vec<f64>,
-    /// `A`, row by row.
+    /// Per level: the step of the episode at which it is held, up to the model's clock.
+    pub(crate) times: Vec<usize>,
+    /// Steps at which later phases of the model begin.
+    pub(crate) later: Vec<usize>,
+    /// Per level: the phase in which it is held.
+    pub(crate) phases: Vec<usize>,
+    /// Per phase: `A`, row by row.
     pub(crate) motion: Vec<f64>,
-    /// Per action: `B u`.
+    /// Per phase and action: `B u`.
     pub(crate) displacements: Vec<f64>,
-    /// `H`, row by row.
+    /// Per phase: `H`, row by row.
     pub(crate) sensor: Vec<f64>,
     pub(crate) actions: usize,
     pub(crate) switches: Vec<Switch>,
@@ -87,21 +72,7 @@ pub struct Filter {
 impl Filter {
     /// The filter of a model that starts at the given belief, with the mode changes the model's events imply.
     pub fn new(model: &Model, levels: &LevelGraph, start: &Belief) -> Self {
-        let switches = model
-            .events
-            .iter()
-            .filter_map(|event| {
-                let becomes = event.becomes?;
-                Some(Switch {
-                    actions: event.actions.clone(),
-                    mode: event.mode,
-                    region: event.region.clone(),
-                    when: event.when,
-                    becomes,
-                })
-            })
-            .collect();
-        Self::with_switches(model, levels, start, switches)
+        Self::with_switches(model, levels, start, model.switches())
     }
 
     /// As [`Filter::new`], with mode changes of the caller's.
@@ -117,24 +88,42 @@ impl Filter {
             model.actions.len(),
         );
         let mut next = Vec::with_capacity(levels.len() * actions);
+        let mut blind = Vec::with_capacity(levels.len() * actions);
         let mut gains = Vec::with_capacity(levels.len() * actions * states * readings);
         for level in 0..levels.len() {
             for action in 0..actions {
                 let step = levels.step(level, levels.class_of(action));
                 next.push(step.next);
+                blind.push(step.blind.next);
                 gains.extend(step.correction.gain.iter());
             }
         }
-        let displacement = |action| model.displacement(action).as_slice().to_vec();
+        let by_row = |matrix: &DMatrix<f64>| matrix.transpose().as_slice().to_vec();
+        let displacement = |(step, action)| model.displacement(action, step).as_slice().to_vec();
+        let phase = |level| model.phase(levels.time(level));
         Self {
             states,
             readings,
-            start: (start.level, start.mode, start.mean.clone()),
+            start: (start.stratum, start.mode, start.mean.clone()),
             next,
+            blind,
             gains,
-            motion: model.motion.a.transpose().as_slice().to_vec(),
-            displacements: (0..actions).flat_map(displacement).collect(),
-            sensor: model.sensor.h.transpose().as_slice().to_vec(),
+            times: (0..levels.len()).map(|level| levels.time(level)).collect(),
+            later: model.phases().skip(1).collect(),
+            phases: (0..levels.len()).map(phase).collect(),
+            motion: model
+                .phases()
+                .flat_map(|step| by_row(&model.motion_at(step).a))
+                .collect(),
+            displacements: model
+                .phases()
+                .flat_map(|step| (0..actions).map(move |action| (step, action)))
+                .flat_map(displacement)
+                .collect(),
+            sensor: model
+                .phases()
+                .flat_map(|step| by_row(&model.sensor_at(step).h))
+                .collect(),
             actions,
             switches,
             walls: (model.belief.walls == WallBelief::Clip).then(|| Barriers::new(model)),
@@ -152,14 +141,14 @@ impl Filter {
 
     /// The same filter with another start; its level is one of the same level graph.
     pub fn starting_at(mut self, start: &Belief) -> Self {
-        self.start = (start.level, start.mode, start.mean.clone());
+        self.start = (start.stratum, start.mode, start.mean.clone());
         self
     }
 
     /// The belief before anything was observed.
     pub fn initial(&self) -> Belief {
         Belief {
-            level: self.start.0,
+            stratum: self.start.0,
             mode: self.start.1,
             mean: self.start.2.clone(),
         }
@@ -167,7 +156,7 @@ impl Filter {
 
     /// Puts a belief back to the start without allocating.
     pub fn reset(&self, belief: &mut Belief) {
-        belief.level = self.start.0;
+        belief.stratum = self.start.0;
         belief.mode = self.start.1;
         belief.mean.copy_from_slice(&self.start.2);
     }
@@ -182,55 +171,66 @@ impl Filter {
         self.readings
     }
 
-    /// Moves the belief on by one action and the observation (length `m`) that followed. `scratch` has length `n`.
-    pub fn update(
+    /// Moves the belief on by one action and what was sensed after it: `m` numbers, or nothing. `scratch` has length `n`.
+    pub fn update<'a>(
         &self,
         belief: &mut Belief,
         action: ActionId,
-        observation: &[f64],
+        reading: impl Into<Reading<'a>>,
         scratch: &mut [f64],
     ) {
-        let before = self.switch(When::Before, belief, action);
-        let (n, edge) = (self.states, self.edge(belief.level, action));
+        let time = self.times[belief.stratum];
+        let before = self.switch(When::Before, belief, action, time);
+        let (n, edge) = (self.states, self.edge(belief.stratum, action));
+        let phase = self.phases[belief.stratum];
         self.predict(belief, action, scratch);
         belief.mean.copy_from_slice(scratch);
-        let size = n * self.readings;
-        let gain = &self.gains[edge * size..(edge + 1) * size];
-        for (reading, (column, &observed)) in gain.chunks_exact(n).zip(observation).enumerate() {
-            let innovation = observed - self.sensed(scratch, reading);
-            for (value, gain) in belief.mean.iter_mut().zip(column) {
-                *value += gain * innovation;
+        belief.stratum = match reading.into() {
+            Reading::Values(observation) => {
+                let size = n * self.readings;
+                let gain = &self.gains[edge * size..(edge + 1) * size];
+                let columns = gain.chunks_exact(n).zip(observation).enumerate();
+                for (reading, (column, &observed)) in columns {
+                    let innovation = observed - self.sensed(phase, scratch, reading);
+                    for (value, gain) in belief.mean.iter_mut().zip(column) {
+                        *value += gain * innovation;
+                    }
+                }
+                self.next[edge]
             }
-        }
+            Reading::Symbol(_) | Reading::Nothing => self.blind[edge],
+        };
         for value in &mut belief.mean {
             *value = value.clamp(-LARGEST, LARGEST);
         }
         if let Some(walls) = &self.walls {
             walls.confine(&mut belief.mean);
         }
-        belief.level = self.next[edge];
         if let Some(recall) = &self.recall {
             belief.mode = recall.next(belief.mode, action, &belief.mean);
             return;
         }
-        let becomes = before.or_else(|| self.switch(When::After, belief, action));
+        let becomes = before.or_else(|| self.switch(When::After, belief, action, time));
         belief.mode = becomes.unwrap_or(belief.mode);
     }
 
     /// The mode afterwards of the first change that happens.
-    fn switch(&self, when: When, belief: &Belief, action: ActionId) -> Option<ModeId> {
+    fn switch(&self, when: When, belief: &Belief, action: ActionId, time: usize) -> Option<ModeId> {
+        let doing = (belief.mode, action);
         let mut switches = self.switches.iter();
-        let switch = switches.find(|switch| switch.happens(when, belief, action));
+        let switch = switches.find(|switch| switch.happens(when, doing, time, &belief.mean));
         switch.map(|switch| switch.becomes)
     }
 
     /// Writes the mean expected after an action, before anything is sensed, to `predicted` (length `n`).
     pub fn predict(&self, belief: &Belief, action: ActionId, predicted: &mut [f64]) {
-        let n = self.states;
-        let displacement = &self.displacements[action * n..(action + 1) * n];
+        let (n, phase) = (self.states, self.phases[belief.stratum]);
+        let motion = &self.motion[phase * n * n..(phase + 1) * n * n];
+        let row = phase * self.actions + action;
+        let displacement = &self.displacements[row * n..(row + 1) * n];
         for ((value, row), shift) in predicted
             .iter_mut()
-            .zip(self.motion.chunks_exact(n))
+            .zip(motion.chunks_exact(n))
             .zip(displacement)
         {
             *value = shift + dot(row, &belief.mean);
@@ -240,14 +240,18 @@ impl Filter {
         }
     }
 
-    /// What the sensor's reading of that number is expected to be at a state.
-    pub fn sensed(&self, state: &[f64], reading: usize) -> f64 {
-        let n = self.states;
-        dot(&self.sensor[reading * n..(reading + 1) * n], state)
+    /// What the sensor's reading of that number is expected to be at a state, after a step from a belief.
+    pub fn expected_reading(&self, from: &Belief, state: &[f64], reading: usize) -> f64 {
+        self.sensed(self.phases[from.stratum], state, reading)
+    }
+
+    fn sensed(&self, phase: usize, state: &[f64], reading: usize) -> f64 {
+        let (n, row) = (self.states, phase * self.readings + reading);
+        dot(&self.sensor[row * n..(row + 1) * n], state)
     }
 
     /// Number of a step of the level graph: levels one after the other, each with its actions.
-    fn edge(&self, level: LevelId, action: ActionId) -> usize {
+    fn edge(&self, level: StratumId, action: ActionId) -> usize {
         level * self.actions + action
     }
 }

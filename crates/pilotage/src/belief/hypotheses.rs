@@ -1,12 +1,14 @@
 //! A belief made of weighted hypotheses, each with its own mode, level and mean (thesis 5.6, Eq. 5.15 and 5.16).
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::filter::{Belief, Filter};
 use super::mdp::BeliefMdp;
+use super::tracker::{Reading, Tracker};
 use crate::error::{Error, Result};
 use crate::model::ActionId;
-use crate::policy::Policy;
 
 /// One hypothesis.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,14 +39,14 @@ pub enum Merge {
 
 /// How hypotheses are pruned and merged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tracking {
+pub struct HypothesisSettings {
     /// Hypotheses of less weight are dropped, in `[0, 1)`; the heaviest always stays.
     pub prune: f64,
     /// When they are merged.
     pub merge: Merge,
 }
 
-impl Default for Tracking {
+impl Default for HypothesisSettings {
     /// Rejection below 0.05 (thesis 5.6.1), merging within a quarter of a standard deviation.
     fn default() -> Self {
         Self {
@@ -54,7 +56,7 @@ impl Default for Tracking {
     }
 }
 
-impl Tracking {
+impl HypothesisSettings {
     /// The thesis' rules: pruning below 0.05, and merging whatever the policy treats alike.
     pub const PRINTED: Self = Self {
         prune: 0.05,
@@ -62,16 +64,20 @@ impl Tracking {
     };
 }
 
-/// Follows all hypotheses of a belief. A step allocates nothing.
-#[derive(Debug, Clone)]
-pub struct Tracker {
+/// Whether two beliefs are treated alike by whoever acts on them.
+type Alike<'a> = Arc<dyn Fn(&Belief, &Belief) -> bool + Send + Sync + 'a>;
+
+/// Follows all hypotheses of a belief, and is read as the heaviest. A step allocates nothing.
+#[derive(Clone)]
+pub struct HypothesisTracker<'a> {
+    alike: Alike<'a>,
     filter: Filter,
     densities: Vec<Density>,
     actions: usize,
     /// Inverse of each level's covariance, to measure distances.
     information: Vec<DMatrix<f64>>,
     starts: Vec<Hypothesis>,
-    settings: Tracking,
+    settings: HypothesisSettings,
     live: Vec<Hypothesis>,
     scratch: Vec<f64>,
     innovation: DVector<f64>,
@@ -113,12 +119,16 @@ impl Density {
     }
 }
 
-impl Tracker {
-    /// A tracker of the start hypotheses of a belief.
+impl<'a> HypothesisTracker<'a> {
+    /// A tracker of the start hypotheses of a belief, for someone who treats two beliefs alike where `alike` says so.
     ///
     /// # Errors
     /// [`Error::Unsupported`] where there is only one, or they are not tracked; [`Error::Setting`] for settings out of range.
-    pub fn new(mdp: &BeliefMdp, settings: Tracking) -> Result<Self> {
+    pub fn new(
+        mdp: &BeliefMdp,
+        settings: HypothesisSettings,
+        alike: impl Fn(&Belief, &Belief) -> bool + Send + Sync + 'a,
+    ) -> Result<Self> {
         let model = mdp.model();
         if mdp.starts().len() < 2 {
             let reason = match model.start.len() {
@@ -167,6 +177,7 @@ impl Tracker {
             })
             .collect();
         Ok(Self {
+            alike: Arc::new(alike),
             filter: mdp.filter(),
             densities: (0..levels.len() * actions).map(density).collect(),
             actions,
@@ -198,29 +209,27 @@ impl Tracker {
         &self.live[(0..self.live.len()).fold(0, heavier)]
     }
 
-    /// Back to the start hypotheses.
-    pub fn reset(&mut self) {
-        self.live.clone_from(&self.starts);
-    }
-
-    /// Moves all hypotheses on by an action and the observation (length `m`) that followed, weighs them by the density of their own
-    /// innovation (Eq. 5.16), prunes and merges.
-    pub fn update(&mut self, action: ActionId, observation: &[f64], policy: &dyn Policy) {
+    /// Moves all hypotheses on by an action and what was sensed after it, weighs them by the density of their own innovation
+    /// (Eq. 5.16), prunes and merges. Nothing sensed speaks for none of them.
+    fn step(&mut self, action: ActionId, reading: Reading<'_>) {
         let mut best = f64::NEG_INFINITY;
         for hypothesis in &mut self.live {
             let belief = &mut hypothesis.belief;
-            self.filter.predict(belief, action, &mut self.scratch);
-            for (reading, (value, observed)) in
-                self.innovation.iter_mut().zip(observation).enumerate()
-            {
-                *value = observed - self.filter.sensed(&self.scratch, reading);
-            }
-            let density = &self.densities[belief.level * self.actions + action];
             // Logarithms, because every density may be too small for a number.
-            hypothesis.weight = hypothesis.weight.ln() + density.log(&self.innovation);
+            hypothesis.weight = hypothesis.weight.ln();
+            if let Reading::Values(observation) = reading {
+                self.filter.predict(belief, action, &mut self.scratch);
+                let values = self.innovation.iter_mut().zip(observation).enumerate();
+                for (reading, (value, observed)) in values {
+                    let expected = self.filter.expected_reading(belief, &self.scratch, reading);
+                    *value = observed - expected;
+                }
+                let density = &self.densities[belief.stratum * self.actions + action];
+                hypothesis.weight += density.log(&self.innovation);
+            }
             best = best.max(hypothesis.weight);
             self.filter
-                .update(belief, action, observation, &mut self.scratch);
+                .update(belief, action, reading, &mut self.scratch);
         }
         for hypothesis in &mut self.live {
             hypothesis.weight = (hypothesis.weight - best).exp();
@@ -229,7 +238,7 @@ impl Tracker {
         let (prune, most) = (self.settings.prune, self.heaviest().weight);
         self.live
             .retain(|hypothesis| hypothesis.weight >= prune.min(most));
-        self.merge(policy);
+        self.merge();
         self.normalise();
     }
 
@@ -240,10 +249,10 @@ impl Tracker {
         }
     }
 
-    fn merge(&mut self, policy: &dyn Policy) {
+    fn merge(&mut self) {
         let mut i = 0;
         while i < self.live.len() {
-            match (i + 1..self.live.len()).find(|&j| self.are_one(i, j, policy)) {
+            match (i + 1..self.live.len()).find(|&j| self.are_one(i, j)) {
                 Some(j) => {
                     let mut other = self.live.remove(j);
                     if other.weight > self.live[i].weight {
@@ -256,23 +265,21 @@ impl Tracker {
         }
     }
 
-    fn are_one(&self, i: usize, j: usize, policy: &dyn Policy) -> bool {
+    fn are_one(&self, i: usize, j: usize) -> bool {
         let (a, b) = (&self.live[i].belief, &self.live[j].belief);
-        if (a.level, a.mode) != (b.level, b.mode) {
+        if (a.stratum, a.mode) != (b.stratum, b.mode) {
             return false;
         }
         match self.settings.merge {
             Merge::Never => false,
             Merge::Coincide(within) => self.apart(a, b) <= within,
-            Merge::Agree(within) => {
-                self.apart(a, b) <= within && policy.action(a) == policy.action(b)
-            }
+            Merge::Agree(within) => self.apart(a, b) <= within && (self.alike)(a, b),
         }
     }
 
     /// Distance of two means at the same level, in standard deviations.
     fn apart(&self, a: &Belief, b: &Belief) -> f64 {
-        let information = &self.information[a.level];
+        let information = &self.information[a.stratum];
         let between = |i: usize| a.mean[i] - b.mean[i];
         let n = a.mean.len();
         let squares: f64 = (0..n)
@@ -280,5 +287,19 @@ impl Tracker {
             .map(|(i, j)| between(i) * information[(i, j)] * between(j))
             .sum();
         squares.max(0.0).sqrt()
+    }
+}
+
+impl Tracker for HypothesisTracker<'_> {
+    fn reset(&mut self) {
+        self.live.clone_from(&self.starts);
+    }
+
+    fn update(&mut self, action: ActionId, reading: Reading<'_>) {
+        self.step(action, reading);
+    }
+
+    fn belief(&self) -> &Belief {
+        &self.heaviest().belief
     }
 }

@@ -18,29 +18,33 @@ const SAME: f64 = 1e-9;
 /// Most numbers that all levels and their steps may be.
 const MOST_NUMBERS: usize = 1 << 26;
 
-/// Index of an uncertainty level.
-pub type LevelId = usize;
+/// Index of a stratum: everything about a belief but its mode and its mean, one of finitely many. For a linear model it is an uncertainty
+/// level.
+pub type StratumId = usize;
 /// Index of a noise class.
 pub type ClassId = usize;
-
-/// Actions that disturb state and sensor in the same way.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NoiseClass {
-    /// Process noise covariance, `n x n`.
-    pub motion_noise: DMatrix<f64>,
-    /// Measurement noise covariance, `m x m`.
-    pub sensor_noise: DMatrix<f64>,
-}
 
 /// One step of a noise class from a level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelStep {
     /// The level it leads to.
-    pub next: LevelId,
+    pub next: StratumId,
     /// Whether there was no room for the level it should lead to, and `next` is the closest there is.
     pub cut: bool,
+    /// Where it leads if the reading is missing.
+    pub blind: BlindStep,
     /// Gain, innovation covariance and the rest of the step.
     pub correction: Correction,
+}
+
+/// Where a step leads after which nothing is sensed, to what the prediction leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BlindStep {
+    /// The level it leads to.
+    pub next: StratumId,
+    /// Whether `next` is only the closest level there is. So it is where the model's readings always come, and one is missing all the
+    /// same.
+    pub cut: bool,
 }
 
 /// All levels that can be reached, and how.
@@ -58,11 +62,12 @@ pub struct LevelGraph {
     ends: bool,
     /// Levels at which a class has come to rest.
     settled: Vec<bool>,
-    classes: Vec<NoiseClass>,
+    /// Of each noise class, actions that disturb state and sensor in the same way, the first.
+    classes: Vec<ActionId>,
     class_of_action: Vec<ClassId>,
     /// By level, then class.
     steps: Vec<Vec<LevelStep>>,
-    starts: Vec<LevelId>,
+    starts: Vec<StratumId>,
     /// Whether every chain closed before the limit of levels.
     converged: bool,
     /// Most levels there is room for.
@@ -105,24 +110,25 @@ impl LevelGraph {
             }
             level += 1;
         }
+        graph.lead_on_blindly(model);
         graph
     }
 
     fn with_classes(model: &Model) -> Self {
-        let mut classes: Vec<NoiseClass> = Vec::new();
+        let mut classes: Vec<ActionId> = Vec::new();
+        let alike = |a: ActionId, b: ActionId| {
+            model.phases().all(|step| {
+                model.motion_noise(a, step) == model.motion_noise(b, step)
+                    && model.sensor_noise(a, step) == model.sensor_noise(b, step)
+            })
+        };
         let class_of_action = (0..model.actions.len())
             .map(|action| {
-                let class = NoiseClass {
-                    motion_noise: model.motion_noise(action).clone(),
-                    sensor_noise: model.sensor_noise(action).clone(),
-                };
-                classes
-                    .iter()
-                    .position(|known| *known == class)
-                    .unwrap_or_else(|| {
-                        classes.push(class);
-                        classes.len() - 1
-                    })
+                let known = classes.iter().position(|&example| alike(example, action));
+                known.unwrap_or_else(|| {
+                    classes.push(action);
+                    classes.len() - 1
+                })
             })
             .collect();
         let (n, m) = (model.state_dim(), model.observation_dim());
@@ -146,23 +152,67 @@ impl LevelGraph {
         }
     }
 
-    fn explore(&mut self, model: &Model, level: LevelId, class: ClassId) -> LevelStep {
-        let NoiseClass {
-            motion_noise,
-            sensor_noise,
-        } = &self.classes[class];
+    fn explore(&mut self, model: &Model, level: StratumId, class: ClassId) -> LevelStep {
+        let (action, time) = (self.classes[class], self.times[level]);
         let correction = Correction::new(
-            &model.motion.a,
-            motion_noise,
-            &model.sensor.h,
-            sensor_noise,
+            &model.motion_at(time).a,
+            model.motion_noise(action, time),
+            &model.sensor_at(time).h,
+            model.sensor_noise(action, time),
             &self.covariances[level],
         );
         let (next, cut) = self.lead(model, level, class, &correction.covariance);
+        let mut blind = BlindStep {
+            next: level,
+            cut: false,
+        };
+        // Where readings always come, the closest level is found once all are known.
+        if model.sensor_at(time).present < 1.0 && !self.is_over(level) {
+            let time = (time + 1).min(self.clock);
+            (blind.next, blind.cut) = self.reach(model, level, &correction.predicted, time);
+        }
         LevelStep {
             next,
             cut,
+            blind,
             correction,
+        }
+    }
+
+    /// The level at a time with a covariance, a new one where there is none; the closest, and true, where there is no room.
+    fn reach(
+        &mut self,
+        model: &Model,
+        from: StratumId,
+        covariance: &DMatrix<f64>,
+        time: usize,
+    ) -> (StratumId, bool) {
+        match self.nearest(covariance, model.belief.level_tolerance, time) {
+            Some(found) => (found, false),
+            None if self.has_room(model, time) => (self.add(covariance.clone(), time), false),
+            None => {
+                self.converged = false;
+                self.cramped |= self.held_at(time) < model.belief.level_limit;
+                (self.closest(covariance, time).unwrap_or(from), true)
+            }
+        }
+    }
+
+    /// Where a reading is missing that the model expects, the belief goes on at the closest level there is.
+    fn lead_on_blindly(&mut self, model: &Model) {
+        for level in 0..self.covariances.len() {
+            if model.sensor_at(self.times[level]).present < 1.0 || self.is_over(level) {
+                continue;
+            }
+            let time = (self.times[level] + 1).min(self.clock);
+            for class in 0..self.classes.len() {
+                let predicted = &self.steps[level][class].correction.predicted;
+                let closest = self.closest(predicted, time);
+                self.steps[level][class].blind = BlindStep {
+                    next: closest.unwrap_or(level),
+                    cut: true,
+                };
+            }
         }
     }
 
@@ -170,10 +220,10 @@ impl LevelGraph {
     fn lead(
         &mut self,
         model: &Model,
-        level: LevelId,
+        level: StratumId,
         class: ClassId,
         covariance: &DMatrix<f64>,
-    ) -> (LevelId, bool) {
+    ) -> (StratumId, bool) {
         if self.is_over(level) {
             return (level, false);
         }
@@ -182,23 +232,14 @@ impl LevelGraph {
             Some(found) if found == level && !self.settled[level] => {
                 (self.settle(model, class, covariance), false)
             }
-            Some(found) => (found, false),
-            None if self.has_room(model, time) => (self.add(covariance.clone(), time), false),
-            None => {
-                self.converged = false;
-                self.cramped |= self.held_at(time) < model.belief.level_limit;
-                (self.closest(covariance, time).unwrap_or(level), true)
-            }
+            _ => self.reach(model, level, covariance, time),
         }
     }
 
     /// The steady level of a class whose covariance no longer changes by more than the tolerance.
-    fn settle(&mut self, model: &Model, class: ClassId, covariance: &DMatrix<f64>) -> LevelId {
-        let NoiseClass {
-            motion_noise,
-            sensor_noise,
-        } = &self.classes[class];
-        let steady = steady_state(&model.motion.a, motion_noise, &model.sensor.h, sensor_noise)
+    fn settle(&mut self, model: &Model, class: ClassId, covariance: &DMatrix<f64>) -> StratumId {
+        let steady = self
+            .steady_state(model, class)
             .unwrap_or_else(|_| covariance.clone());
         let steady = self
             .nearest(&steady, SAME, self.clock)
@@ -207,7 +248,7 @@ impl LevelGraph {
         steady
     }
 
-    fn add(&mut self, covariance: DMatrix<f64>, time: usize) -> LevelId {
+    fn add(&mut self, covariance: DMatrix<f64>, time: usize) -> StratumId {
         self.nearby
             .insert(&covariance, time, self.covariances.len());
         if self.held.len() <= time {
@@ -232,11 +273,11 @@ impl LevelGraph {
     }
 
     /// The level closest to a covariance among those held at a time.
-    fn closest(&self, covariance: &DMatrix<f64>, time: usize) -> Option<LevelId> {
+    fn closest(&self, covariance: &DMatrix<f64>, time: usize) -> Option<StratumId> {
         self.nearest(covariance, f64::INFINITY, time)
     }
 
-    fn nearest(&self, covariance: &DMatrix<f64>, tolerance: f64, time: usize) -> Option<LevelId> {
+    fn nearest(&self, covariance: &DMatrix<f64>, tolerance: f64, time: usize) -> Option<StratumId> {
         self.nearby
             .nearest(&self.covariances, covariance, tolerance, time)
     }
@@ -252,24 +293,24 @@ impl LevelGraph {
     }
 
     /// Covariance of a level, `n x n`.
-    pub fn covariance(&self, level: LevelId) -> &DMatrix<f64> {
+    pub fn covariance(&self, level: StratumId) -> &DMatrix<f64> {
         &self.covariances[level]
     }
 
     /// The step of an episode at which a level is held; where nothing changes with the step any more, the first of those steps.
-    pub fn time(&self, level: LevelId) -> usize {
+    pub fn time(&self, level: StratumId) -> usize {
         self.times[level]
     }
 
     /// Whether an episode is over at a level.
-    pub fn is_over(&self, level: LevelId) -> bool {
+    pub fn is_over(&self, level: StratumId) -> bool {
         self.ends && self.times[level] == self.clock
     }
 
     /// Covariance of the next mean around its prediction after a step of a class: `K S K'`. Where levels were cut, what the step
     /// would leave of the uncertainty is not what the level it leads to has, and the mean moves by the difference that is true of these
     /// two, `P- - P`, so that looking is not worth more than it tells.
-    pub fn mean_covariance(&self, level: LevelId, class: ClassId) -> DMatrix<f64> {
+    pub fn mean_covariance(&self, level: StratumId, class: ClassId) -> DMatrix<f64> {
         let step = &self.steps[level][class];
         if !step.cut {
             return step.correction.mean_covariance();
@@ -278,8 +319,19 @@ impl LevelGraph {
         &root * root.transpose()
     }
 
-    /// The noise classes.
-    pub fn classes(&self) -> &[NoiseClass] {
+    /// Where a class's covariance comes to rest if its action is taken for ever, once the model's clock has run out.
+    fn steady_state(&self, model: &Model, class: ClassId) -> Result<DMatrix<f64>> {
+        let (action, time) = (self.classes[class], self.clock);
+        steady_state(
+            &model.motion_at(time).a,
+            model.motion_noise(action, time),
+            &model.sensor_at(time).h,
+            model.sensor_noise(action, time),
+        )
+    }
+
+    /// The first action of each noise class: actions of one disturb state and sensor in the same way.
+    pub fn classes(&self) -> &[ActionId] {
         &self.classes
     }
 
@@ -289,12 +341,12 @@ impl LevelGraph {
     }
 
     /// What one step of a class does at a level.
-    pub fn step(&self, level: LevelId, class: ClassId) -> &LevelStep {
+    pub fn step(&self, level: StratumId, class: ClassId) -> &LevelStep {
         &self.steps[level][class]
     }
 
     /// Levels of the start covariances, in the order given.
-    pub fn starts(&self) -> &[LevelId] {
+    pub fn starts(&self) -> &[StratumId] {
         &self.starts
     }
 
@@ -342,7 +394,7 @@ impl LevelGraph {
         Ok(())
     }
 
-    fn check_level(&self, model: &Model, level: LevelId) -> Result<()> {
+    fn check_level(&self, model: &Model, level: StratumId) -> Result<()> {
         /// Share of the largest entry that rounding may make negative.
         const ROUNDING: f64 = 1e-9;
         let covariance = &self.covariances[level];
@@ -378,20 +430,14 @@ impl LevelGraph {
         if self.converged {
             return Ok(());
         }
-        for (id, class) in self.classes.iter().enumerate() {
+        for id in 0..self.classes.len() {
             let grows = (0..self.len()).any(|level| {
                 let LevelStep {
                     next, correction, ..
                 } = &self.steps[level][id];
                 *next == level && correction.covariance.trace() > self.covariances[level].trace()
             });
-            let steady = steady_state(
-                &model.motion.a,
-                &class.motion_noise,
-                &model.sensor.h,
-                &class.sensor_noise,
-            );
-            match steady {
+            match self.steady_state(model, id) {
                 Err(error @ Error::NoSteadyState { .. }) if grows => return Err(error),
                 _ => {}
             }
@@ -400,7 +446,7 @@ impl LevelGraph {
     }
 
     /// The level that repeats itself under a class, followed from a start; `None` where levels run in a circle or were cut.
-    pub fn steady(&self, start: LevelId, class: ClassId) -> Option<LevelId> {
+    pub fn steady(&self, start: StratumId, class: ClassId) -> Option<StratumId> {
         let mut level = start;
         for _ in 0..=self.len() {
             let next = self.steps[level][class].next;

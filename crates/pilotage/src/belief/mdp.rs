@@ -8,8 +8,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::filter::{Belief, Filter};
 use super::gaussian::{interval_probability, region_probability};
-use super::levels::{LevelGraph, LevelId};
+use super::levels::{ClassId, LevelGraph, StratumId};
 use super::mixture::Mixture;
+use crate::error::Result;
 use crate::model::{
     ActionId, Barriers, Effect, HypothesisBelief, Interval, Map, ModeId, Model, Outcome, Region,
     Then, WallBelief, When, apart,
@@ -72,7 +73,14 @@ impl BeliefMdp {
             .zip(levels.starts())
             .map(|(&(weight, mode, mean, _), &level)| {
                 let mean = mean.as_slice().to_vec();
-                (weight, Belief { level, mode, mean })
+                (
+                    weight,
+                    Belief {
+                        stratum: level,
+                        mode,
+                        mean,
+                    },
+                )
             })
             .collect();
         let mixture = Mixture::of(model, &levels, &mean);
@@ -121,6 +129,62 @@ impl BeliefMdp {
         &self.levels
     }
 
+    /// Number of strata, at least 1.
+    pub fn strata(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// Covariance of the beliefs of a stratum, `n x n`.
+    pub fn covariance(&self, stratum: StratumId) -> &DMatrix<f64> {
+        self.levels.covariance(stratum)
+    }
+
+    /// Whether an episode is over at a stratum.
+    pub fn is_over(&self, stratum: StratumId) -> bool {
+        self.levels.is_over(stratum)
+    }
+
+    /// Number of noise classes: actions of one lead from every stratum to the same one, with means that spread alike.
+    pub fn classes(&self) -> usize {
+        self.levels.classes().len()
+    }
+
+    /// Noise class of an action.
+    pub fn class_of(&self, action: ActionId) -> ClassId {
+        self.levels.class_of(action)
+    }
+
+    /// The stratum after a step of a class.
+    pub fn next(&self, stratum: StratumId, class: ClassId) -> StratumId {
+        self.levels.step(stratum, class).next
+    }
+
+    /// The stratum after a step of a class whose reading is missing.
+    pub fn next_blind(&self, stratum: StratumId, class: ClassId) -> StratumId {
+        self.levels.step(stratum, class).blind.next
+    }
+
+    /// Probability that there is a reading after a step from a stratum.
+    pub fn present(&self, stratum: StratumId) -> f64 {
+        self.model.sensor_at(self.levels.time(stratum)).present
+    }
+
+    /// Checks that every belief is one, see [`LevelGraph::check`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check(&self) -> Result<()> {
+        self.levels.check(&self.model)
+    }
+
+    /// Checks that no uncertainty grows for ever, see [`LevelGraph::check_bounded`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn check_bounded(&self) -> Result<()> {
+        self.levels.check_bounded(&self.model)
+    }
+
     /// The belief at the start; the first one where hypotheses are tracked.
     pub fn start(&self) -> &Belief {
         &self.starts[0].1
@@ -156,7 +220,7 @@ impl BeliefMdp {
     }
 
     /// Weight and mean of each start hypothesis at a belief, where one filter keeps them all.
-    pub fn hypotheses(&self, level: LevelId, mean: &[f64]) -> Option<Vec<(f64, DVector<f64>)>> {
+    pub fn hypotheses(&self, level: StratumId, mean: &[f64]) -> Option<Vec<(f64, DVector<f64>)>> {
         let mixture = self.mixture.as_ref()?;
         Some(mixture.hypotheses(level, mean))
     }
@@ -168,13 +232,13 @@ impl BeliefMdp {
     }
 
     /// What an action can do in a mode at a level, with regions as the belief reads them.
-    pub fn effects(&self, mode: ModeId, level: LevelId, action: ActionId) -> &[Effect] {
+    pub fn effects(&self, mode: ModeId, level: StratumId, action: ActionId) -> &[Effect] {
         let time = self.levels.time(level).min(self.effects.len() - 1);
         &self.effects[time][mode][action]
     }
 
     /// Probability that the true state lies in the region (Eq. 5.2, exact).
-    pub fn probability(&self, level: LevelId, mean: &[f64], region: &Region) -> f64 {
+    pub fn probability(&self, level: StratumId, mean: &[f64], region: &Region) -> f64 {
         match self.reading {
             Reading::Clipped => beyond_walls(&self.model, region)
                 .map_or(0.0, |region| self.mass(level, mean, &region)),
@@ -183,7 +247,7 @@ impl BeliefMdp {
     }
 
     /// As [`BeliefMdp::probability`], for a region as the belief reads it.
-    fn mass(&self, level: LevelId, mean: &[f64], region: &Region) -> f64 {
+    fn mass(&self, level: StratumId, mean: &[f64], region: &Region) -> f64 {
         self.averaged(level, mean, |mean, covariance| {
             region_probability(mean, covariance, region)
         })
@@ -193,7 +257,7 @@ impl BeliefMdp {
     /// predicts it, N(A m + B u, P-).
     fn holds(
         &self,
-        level: LevelId,
+        level: StratumId,
         mean: &[f64],
         action: ActionId,
         region: &Region,
@@ -205,21 +269,22 @@ impl BeliefMdp {
         if when == When::Before || self.read_as_mixture().is_some() {
             return self.mass(level, mean, region);
         }
-        let predicted = self.predicted(mean, action);
+        let predicted = self.predicted(level, mean, action);
         let class = self.levels.class_of(action);
         let covariance = &self.levels.step(level, class).correction.predicted;
         region_probability(predicted.as_slice(), covariance, region)
     }
 
     /// Where an action leads from a state or mean, noise apart: `A m + B u`, on this side of every wall the belief knows of.
-    pub fn predicted(&self, mean: &[f64], action: ActionId) -> DVector<f64> {
-        let moved = &self.model.motion.a * DVector::from_column_slice(mean)
-            + self.model.displacement(action);
+    pub fn predicted(&self, stratum: StratumId, mean: &[f64], action: ActionId) -> DVector<f64> {
+        let time = self.levels.time(stratum);
+        let moved = &self.model.motion_at(time).a * DVector::from_column_slice(mean)
+            + self.model.displacement(action, time);
         self.stop(mean, moved)
     }
 
     /// Probability that the true state is within what [`crate::model::Episode::alive`] allows.
-    pub fn alive(&self, level: LevelId, mean: &[f64]) -> f64 {
+    pub fn alive(&self, level: StratumId, mean: &[f64]) -> f64 {
         let alive = &self.model.episode.alive;
         if alive.sides.is_empty() {
             return 1.0;
@@ -231,14 +296,15 @@ impl BeliefMdp {
     /// does not know it.
     ///
     /// Counting the probability of being outside afresh at every step would count the same error of the estimate over and over.
-    pub fn survival(&self, level: LevelId, mean: &[f64], action: ActionId) -> Survival {
+    pub fn survival(&self, level: StratumId, mean: &[f64], action: ActionId) -> Survival {
         let alive = &self.model.episode.alive;
         if alive.sides.is_empty() || self.model.actions[action].then != Then::Continue {
             return Survival::SURE;
         }
-        let (a, covariance) = (&self.model.motion.a, self.levels.covariance(level));
+        let a = &self.model.motion_at(self.levels.time(level)).a;
+        let covariance = self.levels.covariance(level);
         let step = self.levels.step(level, self.levels.class_of(action));
-        let predicted = self.predicted(mean, action);
+        let predicted = self.predicted(level, mean, action);
         let carried = a * covariance;
         let sides = alive.sides.iter().map(|&(i, side)| {
             let later = (predicted[i], step.correction.predicted[(i, i)]);
@@ -255,7 +321,7 @@ impl BeliefMdp {
     pub fn step(
         &self,
         mode: ModeId,
-        level: LevelId,
+        level: StratumId,
         mean: &[f64],
         action: ActionId,
     ) -> (f64, Vec<Outcome>) {
@@ -284,14 +350,14 @@ impl BeliefMdp {
     }
 
     /// Expected cost of a step, as a negative reward.
-    fn running_cost(&self, level: LevelId, mean: &[f64], action: ActionId) -> f64 {
+    fn running_cost(&self, level: StratumId, mean: &[f64], action: ActionId) -> f64 {
         self.averaged(level, mean, |mean, covariance| {
             self.model.running_cost(mean, Some(covariance), action)
         })
     }
 
     /// Expected cost of ending an episode, as a negative reward.
-    pub fn terminal_cost(&self, level: LevelId, mean: &[f64]) -> f64 {
+    pub fn terminal_cost(&self, level: StratumId, mean: &[f64]) -> f64 {
         self.averaged(level, mean, |mean, covariance| {
             self.model.terminal_cost(mean, Some(covariance))
         })
@@ -300,7 +366,7 @@ impl BeliefMdp {
     /// Average of something that is known of a Gaussian.
     fn averaged(
         &self,
-        level: LevelId,
+        level: StratumId,
         mean: &[f64],
         of: impl Fn(&[f64], &DMatrix<f64>) -> f64,
     ) -> f64 {
@@ -318,7 +384,7 @@ impl BeliefMdp {
     }
 
     /// Expected immediate reward `r(b, a)`, see [`BeliefMdp::step`].
-    pub fn reward(&self, mode: ModeId, level: LevelId, mean: &[f64], action: ActionId) -> f64 {
+    pub fn reward(&self, mode: ModeId, level: StratumId, mean: &[f64], action: ActionId) -> f64 {
         self.step(mode, level, mean, action).0
     }
 
@@ -326,7 +392,7 @@ impl BeliefMdp {
     pub fn outcomes(
         &self,
         mode: ModeId,
-        level: LevelId,
+        level: StratumId,
         mean: &[f64],
         action: ActionId,
     ) -> Vec<Outcome> {
@@ -337,32 +403,34 @@ impl BeliefMdp {
     /// agent observe. The innovation's own noise has covariance [`BeliefMdp::mean_covariance`] around it.
     pub fn centres(
         &self,
-        level: LevelId,
+        level: StratumId,
         mean: &[f64],
         action: ActionId,
     ) -> Vec<(f64, DVector<f64>)> {
-        let predicted = self.predicted(mean, action);
+        let predicted = self.predicted(level, mean, action);
         let Some(mixture) = self.read_as_mixture() else {
             return vec![(1.0, predicted)];
         };
         let class = self.levels.class_of(action);
         let gain = &self.levels.step(level, class).correction.gain;
+        let h = &self.model.sensor_at(self.levels.time(level)).h;
         let mut centres = mixture.hypotheses(level, mean);
         for (_, x) in &mut centres {
-            *x = &predicted + gain * &self.model.sensor.h * (&*x - &predicted);
+            *x = &predicted + gain * h * (&*x - &predicted);
         }
         centres
     }
 
     /// Covariance of the next mean around its centre after an action of this class: `K S K'` (Eq. 5.6, corrected); for a mixture
     /// with the `S` of each of its hypotheses.
-    pub fn mean_covariance(&self, level: LevelId, class: usize) -> DMatrix<f64> {
+    pub fn mean_covariance(&self, level: StratumId, class: usize) -> DMatrix<f64> {
         let step = self.levels.step(level, class);
         match self.read_as_mixture() {
             None => self.levels.mean_covariance(level, class),
             Some(mixture) => {
-                let (gain, h) = (&step.correction.gain, &self.model.sensor.h);
-                let noise = &self.levels.classes()[class].sensor_noise;
+                let time = self.levels.time(level);
+                let (gain, h) = (&step.correction.gain, &self.model.sensor_at(time).h);
+                let noise = self.model.sensor_noise(self.levels.classes()[class], time);
                 let innovation = h * mixture.covariance(level) * h.transpose() + noise;
                 gain * innovation * gain.transpose()
             }

@@ -13,7 +13,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::levels::{LevelGraph, LevelId};
+use super::levels::{LevelGraph, StratumId};
 use crate::model::{Model, StartHypothesis};
 
 /// The hypotheses of a start as functions of level and mean.
@@ -66,12 +66,12 @@ impl Mixture {
     }
 
     /// Covariance of every hypothesis at a level, `n x n`; 0 where they are points.
-    pub fn covariance(&self, level: LevelId) -> &DMatrix<f64> {
+    pub fn covariance(&self, level: StratumId) -> &DMatrix<f64> {
         &self.learned[level].covariance
     }
 
     /// Weight and mean of each hypothesis.
-    pub fn hypotheses(&self, level: LevelId, mean: &[f64]) -> Vec<(f64, DVector<f64>)> {
+    pub fn hypotheses(&self, level: StratumId, mean: &[f64]) -> Vec<(f64, DVector<f64>)> {
         let Learned {
             information,
             gained,
@@ -101,13 +101,14 @@ fn suits(model: &Model) -> bool {
     let alike = |start: &StartHypothesis| {
         (start.mode, &start.covariance) == (first.mode, &first.covariance)
     };
-    let still = |action| {
-        model.motion_noise(action).amax() == 0.0 && model.displacement(action).amax() == 0.0
+    let still = |step| {
+        model.motion_at(step).a == DMatrix::identity(n, n)
+            && (0..model.actions.len()).all(|action| {
+                model.motion_noise(action, step).amax() == 0.0
+                    && model.displacement(action, step).amax() == 0.0
+            })
     };
-    model.start.len() > 1
-        && model.start.iter().all(alike)
-        && model.motion.a == DMatrix::identity(n, n)
-        && (0..model.actions.len()).all(still)
+    model.start.len() > 1 && model.start.iter().all(alike) && model.phases().all(still)
 }
 
 fn inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {

@@ -10,11 +10,13 @@ mod mixture;
 mod nearby;
 pub mod recall;
 pub mod riccati;
+mod tracker;
 
 pub(crate) use filter::is_kept;
-pub use filter::{Belief, Filter, LARGEST, Switch};
-pub use hypotheses::{Hypothesis, Merge, Tracker, Tracking};
+pub use filter::{Belief, Filter, LARGEST};
+pub use hypotheses::{Hypothesis, HypothesisSettings, HypothesisTracker, Merge};
 pub use kalman::{Correction, KalmanFilter};
-pub use levels::{ClassId, LevelGraph, LevelId};
+pub use levels::{ClassId, LevelGraph, StratumId};
 pub use mdp::{BeliefMdp, Survival};
 pub use recall::{ClusterId, Clusters, Recall};
+pub use tracker::{KalmanTracker, Reading, Tracker, Tracking};

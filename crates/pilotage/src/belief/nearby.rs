@@ -34,19 +34,36 @@ impl Nearby {
         /// More than rounding can do to a weighted mean, as a share of the largest entry.
         const ROUNDING: f64 = 1e-11;
         let mean = weighted_mean(to);
-        let reach = tolerance + ROUNDING * (to.amax() + tolerance);
-        let (low, high) = (mean - reach, mean + reach);
-        if low.is_nan() || high.is_nan() {
+        if !mean.is_finite() {
             return None;
         }
-        let candidates = self
-            .order
-            .range((group, rising(low), 0)..=(group, rising(high), usize::MAX));
-        candidates
-            .map(|&(.., place)| (distance(to, &list[place]), place))
-            .filter(|&(distance, _)| distance <= tolerance)
-            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
-            .map(|(_, place)| place)
+        // Outwards from the mean in both directions, as far as something nearer may lie.
+        let (first, middle, last) = (
+            (group, 0, 0),
+            (group, rising(mean), 0),
+            (group, u64::MAX, usize::MAX),
+        );
+        let mut below = self.order.range(first..middle).rev().peekable();
+        let mut above = self.order.range(middle..=last).peekable();
+        let apart = |key: Option<&&(usize, u64, usize)>| {
+            key.map_or(f64::INFINITY, |key| (number(key.1) - mean).abs())
+        };
+        let mut best: Option<(f64, usize)> = None;
+        loop {
+            let (down, up) = (apart(below.peek()), apart(above.peek()));
+            let within = best.map_or(tolerance, |(distance, _)| distance);
+            let reach = within + ROUNDING * (to.amax() + within);
+            if down.min(up) > reach {
+                break;
+            }
+            let next = if down <= up { below.next() } else { above.next() };
+            let Some(&(.., place)) = next else { break };
+            let found = (distance(to, &list[place]), place);
+            if found.0 <= within && best.is_none_or(|best| found < best) {
+                best = Some(found);
+            }
+        }
+        best.map(|(_, place)| place)
     }
 }
 
@@ -66,6 +83,12 @@ fn rising(number: f64) -> u64 {
     let bits = (number + 0.0).to_bits();
     let sign = 1 << 63;
     if bits & sign == 0 { bits | sign } else { !bits }
+}
+
+/// The number whose bits [`rising`] made these.
+fn number(bits: u64) -> f64 {
+    let sign = 1 << 63;
+    f64::from_bits(if bits & sign == 0 { !bits } else { bits ^ sign })
 }
 
 #[cfg(test)]

@@ -37,6 +37,8 @@ pub struct ModelBuilder {
     starts: Vec<Start>,
     motion: [Vec<f64>; 3],
     sensor: [Vec<f64>; 2],
+    present: f64,
+    later: Vec<Phase>,
     actions: Vec<Action>,
     rewards: Vec<(f64, Clause)>,
     events: Vec<(f64, Change, Clause)>,
@@ -122,6 +124,8 @@ impl ModelBuilder {
             starts: Vec::new(),
             motion: Default::default(),
             sensor: Default::default(),
+            present: 1.0,
+            later: Vec::new(),
             actions: Vec::new(),
             rewards: Vec::new(),
             events: Vec::new(),
@@ -184,6 +188,18 @@ impl ModelBuilder {
     /// Sensor `o = H s + n`, row by row: `H` is `m x n`, the covariance of `n` is `m x m`.
     pub fn sensor(mut self, h: &[f64], noise: &[f64]) -> Self {
         self.sensor = [h, noise].map(<[f64]>::to_vec);
+        self
+    }
+
+    /// Probability that there is a reading after a step, in `[0, 1]`; 1 unless it is said.
+    pub fn present(mut self, probability: f64) -> Self {
+        self.present = probability;
+        self
+    }
+
+    /// How the state moves and is sensed from a step of the episode on.
+    pub fn later(mut self, phase: Phase) -> Self {
+        self.later.push(phase);
         self
     }
 
@@ -335,8 +351,10 @@ impl ModelBuilder {
                 noise: square(noise, n, path("motion", "noise"))?,
                 b,
             },
+            later: self.later,
             sensor: Sensor {
                 noise: square(&self.sensor[1], m, path("sensor", "noise"))?,
+                present: self.present,
                 h,
             },
             start: starts,

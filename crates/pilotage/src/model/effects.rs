@@ -7,7 +7,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{ActionId, Event, ModeId, Model, Region, Then, When};
+use super::{ActionId, Event, ModeId, Model, Region, Steps, Then, When, applies};
 
 /// One thing that a step can do. Whoever knows how likely its region holds knows the rest ([`Tally`]).
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +42,74 @@ pub struct Outcome {
     pub then: Then,
 }
 
+/// A change of mode that an agent infers from its own action and where it believes to be. Of several the first happens, those before
+/// the move first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Switch {
+    /// Actions it happens on; `None` for all.
+    pub actions: Option<Vec<ActionId>>,
+    /// Mode it happens in; `None` for any.
+    pub mode: Option<ModeId>,
+    /// Where the mean must be.
+    pub region: Region,
+    /// Whether it must be there when the action is taken, or once what it brought has been sensed.
+    pub when: When,
+    /// Steps of an episode in which it happens.
+    pub steps: Steps,
+    /// Mode afterwards.
+    pub becomes: ModeId,
+}
+
+impl Switch {
+    /// Whether it happens to someone who is at a place (length `n`) then, in a mode, with an action, at a step.
+    pub fn happens(
+        &self,
+        when: When,
+        (mode, action): (ModeId, ActionId),
+        step: usize,
+        at: &[f64],
+    ) -> bool {
+        self.when == when
+            && applies(&self.actions, self.mode, mode, action)
+            && self.steps.contains(step)
+            && self.region.contains(at)
+    }
+}
+
 impl Model {
+    /// How the mode changes for someone who takes the mean of a belief for the state.
+    ///
+    /// An event that leaves the mode as it is stands in the way of those after it, unless it ends or restarts the episode: who goes on
+    /// knows that it has not happened.
+    pub fn switches(&self) -> Vec<Switch> {
+        let (before, after): (Vec<&Event>, Vec<&Event>) = self
+            .events
+            .iter()
+            .partition(|event| event.when == When::Before);
+        let events = [before, after].concat();
+        let last = events.iter().rposition(|event| event.becomes.is_some());
+        let of = |(i, event): (usize, &&Event)| {
+            let to = |mode, becomes| Switch {
+                actions: event.actions.clone(),
+                mode,
+                region: event.region.clone(),
+                when: event.when,
+                steps: event.steps,
+                becomes,
+            };
+            match (event.becomes, event.mode) {
+                (Some(becomes), mode) => vec![to(mode, becomes)],
+                _ if event.then != Then::Continue || Some(i) > last => Vec::new(),
+                (None, Some(mode)) => vec![to(Some(mode), mode)],
+                (None, None) => {
+                    let modes = 0..self.modes.len();
+                    modes.map(|mode| to(Some(mode), mode)).collect()
+                }
+            }
+        };
+        events.iter().enumerate().flat_map(of).collect()
+    }
+
     /// All that an action can do in a mode: rewards, then events in the order in which they are asked, those before the move first.
     /// `step` counts the steps of the episode from 0.
     pub fn effects(&self, mode: ModeId, action: ActionId, step: usize) -> Vec<Effect> {
@@ -107,7 +174,8 @@ impl Model {
     pub fn clock(&self) -> usize {
         let rewards = self.rewards.iter().map(|term| term.steps);
         let steps = rewards.chain(self.events.iter().map(|event| event.steps));
-        steps.map(|steps| steps.settled()).max().unwrap_or(0)
+        let settled = steps.map(|steps| steps.settled());
+        settled.chain(self.phases()).max().unwrap_or(0)
     }
 
     /// Whether anything leads back to the start.

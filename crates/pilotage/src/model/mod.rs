@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 pub use barriers::Barriers;
 pub use builder::{Clause, ModelBuilder};
-pub use effects::{Change, Effect, Outcome, Tally, apart};
+pub use effects::{Change, Effect, Outcome, Switch, Tally, apart};
 pub use error::{Fault, ModelError, Path, Place, Step, nearest, suggest};
 pub use fingerprint::{Fingerprint, NotAFingerprint};
 pub use map::Map;
@@ -54,6 +54,8 @@ pub struct Model {
     pub motion: Motion,
     /// Sensor model.
     pub sensor: Sensor,
+    /// Motion and sensor from later steps of an episode on, in the order of their steps.
+    pub later: Vec<Phase>,
     /// The actions, in file order. Ties between actions go to the first.
     pub actions: Vec<Action>,
     /// Rewards `r(s, a)`, added up over all terms that apply.
@@ -122,6 +124,19 @@ pub struct Sensor {
     pub h: DMatrix<f64>,
     /// Measurement noise covariance `R`, `m x m`, for actions that do not state their own.
     pub noise: DMatrix<f64>,
+    /// Probability that there is a reading after a step, in `[0, 1]`, whatever the state. The agent knows when one is missing.
+    pub present: f64,
+}
+
+/// How the state moves and is sensed from a step of the episode on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Phase {
+    /// The first step, at least 1 and more than that of the phase before.
+    pub from: usize,
+    /// Motion by the actions of these steps.
+    pub motion: Motion,
+    /// Sensor after the actions of these steps.
+    pub sensor: Sensor,
 }
 
 /// One action the agent can take.
@@ -331,25 +346,53 @@ impl Model {
         self.sensor.h.nrows()
     }
 
-    /// Process noise covariance of an action.
-    pub fn motion_noise(&self, action: ActionId) -> &DMatrix<f64> {
-        self.actions[action]
-            .motion_noise
-            .as_ref()
-            .unwrap_or(&self.motion.noise)
+    /// Number of the phase that a step of an episode belongs to: 0 is that of [`Model::motion`] and [`Model::sensor`], then those of
+    /// [`Model::later`].
+    pub fn phase(&self, step: usize) -> usize {
+        self.later.partition_point(|phase| phase.from <= step)
     }
 
-    /// Measurement noise covariance after an action.
-    pub fn sensor_noise(&self, action: ActionId) -> &DMatrix<f64> {
-        self.actions[action]
-            .sensor_noise
-            .as_ref()
-            .unwrap_or(&self.sensor.noise)
+    /// How the actions of a step move the state.
+    pub fn motion_at(&self, step: usize) -> &Motion {
+        match self.phase(step) {
+            0 => &self.motion,
+            phase => &self.later[phase - 1].motion,
+        }
     }
 
-    /// Displacement `B u` of an action.
-    pub fn displacement(&self, action: ActionId) -> DVector<f64> {
-        &self.motion.b * &self.actions[action].control
+    /// What is sensed after the actions of a step.
+    pub fn sensor_at(&self, step: usize) -> &Sensor {
+        match self.phase(step) {
+            0 => &self.sensor,
+            phase => &self.later[phase - 1].sensor,
+        }
+    }
+
+    /// Process noise covariance of an action at a step.
+    pub fn motion_noise(&self, action: ActionId, step: usize) -> &DMatrix<f64> {
+        let own = self.actions[action].motion_noise.as_ref();
+        own.unwrap_or(&self.motion_at(step).noise)
+    }
+
+    /// Measurement noise covariance after an action at a step.
+    pub fn sensor_noise(&self, action: ActionId, step: usize) -> &DMatrix<f64> {
+        let own = self.actions[action].sensor_noise.as_ref();
+        own.unwrap_or(&self.sensor_at(step).noise)
+    }
+
+    /// Displacement `B u` of an action at a step.
+    pub fn displacement(&self, action: ActionId, step: usize) -> DVector<f64> {
+        &self.motion_at(step).b * &self.actions[action].control
+    }
+
+    /// Steps at which phases begin.
+    pub(crate) fn phases(&self) -> impl Iterator<Item = usize> {
+        std::iter::once(0).chain(self.later.iter().map(|phase| phase.from))
+    }
+
+    /// Whether a reading may be missing at some step.
+    pub fn misses_readings(&self) -> bool {
+        self.phases().any(|step| self.sensor_at(step).present < 1.0)
     }
 
     /// Where something good is paid: the regions of all rewards and events above 0.

@@ -55,14 +55,7 @@ impl Model {
             let path = Path::new("event").index(i);
             self.check_condition(&event.actions, event.mode, &event.region, &path)?;
             self.check_mode(event.becomes, path.clone().key("becomes"))?;
-            finite(event.reward, path.clone().key("reward"))?;
-            if event.steps != Steps::ALL && event.becomes.is_some() {
-                return Err(Fault::of_key(
-                    path.key("steps"),
-                    "the mode changes in some steps only, and the agent's filter does not count steps",
-                    "delete `steps`, or `becomes`",
-                ));
-            }
+            finite(event.reward, path.key("reward"))?;
         }
         self.check_cost()?;
         self.check_belief()
@@ -118,41 +111,65 @@ impl Model {
     }
 
     fn check_motion_and_sensor(&self) -> Result<(), Fault> {
-        let n = self.state_dim();
-        let (motion, sensor) = (Path::new("motion"), Path::new("sensor"));
-        let variables = format!("there are {n} state variables");
-        shape(&self.motion.a, (n, n), &variables, motion.clone().key("A"))?;
-        finite_matrix(&self.motion.a, motion.clone().key("A"))?;
-        shape(
-            &self.motion.b,
-            (n, self.motion.b.ncols().max(1)),
-            &variables,
-            motion.clone().key("B"),
-        )?;
-        finite_matrix(&self.motion.b, motion.clone().key("B"))?;
+        let path = |key: &str| Path::new(key);
+        self.check_motion(&self.motion, path("motion"))?;
         let controls = self.motion.b.ncols();
-        at_most(
-            controls,
-            MOST_DIMENSIONS,
-            "controls",
-            motion.clone().key("B"),
-        )?;
-        covariance(&self.motion.noise, n, &variables, motion.key("noise"))?;
+        let place = path("motion").key("B");
+        at_most(controls, MOST_DIMENSIONS, "controls", place)?;
         let m = self.observation_dim();
-        at_most(
+        let place = path("sensor").key("H");
+        at_most(m, MOST_DIMENSIONS, "sensor readings", place)?;
+        self.check_sensor(&self.sensor, path("sensor"))?;
+        let mut before = 0;
+        for (i, phase) in self.later.iter().enumerate() {
+            let path = path("later").index(i);
+            if phase.from <= before {
+                return Err(Fault::new(
+                    path.key("from"),
+                    format!(
+                        "it begins at step {}, and what is before it at step {before}",
+                        phase.from
+                    ),
+                    "give steps that rise, the first at least 1",
+                ));
+            }
+            before = phase.from;
+            self.check_motion(&phase.motion, path.clone().key("motion"))?;
+            self.check_sensor(&phase.sensor, path.key("sensor"))?;
+        }
+        Ok(())
+    }
+
+    fn check_motion(&self, motion: &Motion, path: Path) -> Result<(), Fault> {
+        let n = self.state_dim();
+        let variables = format!("there are {n} state variables");
+        shape(&motion.a, (n, n), &variables, path.clone().key("A"))?;
+        finite_matrix(&motion.a, path.clone().key("A"))?;
+        let size = (n, self.motion.b.ncols().max(1));
+        shape(&motion.b, size, &variables, path.clone().key("B"))?;
+        finite_matrix(&motion.b, path.clone().key("B"))?;
+        covariance(&motion.noise, n, &variables, path.key("noise"))
+    }
+
+    fn check_sensor(&self, sensor: &Sensor, path: Path) -> Result<(), Fault> {
+        let (n, m) = (self.state_dim(), self.observation_dim());
+        let variables = format!("there are {n} state variables");
+        shape(&sensor.h, (m.max(1), n), &variables, path.clone().key("H"))?;
+        finite_matrix(&sensor.h, path.clone().key("H"))?;
+        covariance(
+            &sensor.noise,
             m,
-            MOST_DIMENSIONS,
-            "sensor readings",
-            sensor.clone().key("H"),
+            &self.readings(),
+            path.clone().key("noise"),
         )?;
-        shape(
-            &self.sensor.h,
-            (m.max(1), n),
-            &variables,
-            sensor.clone().key("H"),
-        )?;
-        finite_matrix(&self.sensor.h, sensor.clone().key("H"))?;
-        covariance(&self.sensor.noise, m, &self.readings(), sensor.key("noise"))
+        if !(0.0..=1.0).contains(&sensor.present) {
+            return Err(Fault::new(
+                path.key("present"),
+                format!("the probability of a reading is {}", sensor.present),
+                "give a number from 0 to 1",
+            ));
+        }
+        Ok(())
     }
 
     fn readings(&self) -> String {
@@ -167,8 +184,13 @@ impl Model {
         for action in &self.actions {
             let path = path.clone().key(&action.name);
             self.check_control(&action.control, &path)?;
-            let moved = &self.motion.b * &action.control;
-            if moved.iter().any(|x| !x.is_finite()) {
+            let moved = self
+                .phases()
+                .map(|step| &self.motion_at(step).b * &action.control);
+            if moved
+                .into_iter()
+                .any(|moved| moved.iter().any(|x| !x.is_finite()))
+            {
                 return Err(Fault::new(
                     path.key("u"),
                     "B u is not finite",

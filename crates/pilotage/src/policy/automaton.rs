@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::belief::{Belief, BeliefMdp, Filter, LevelId};
+use crate::belief::{Belief, BeliefMdp, Filter, StratumId};
 use crate::model::{ActionId, Fingerprint, ModeId};
 use crate::policy::{Coordinates, Policy};
 
@@ -57,7 +57,7 @@ pub enum Matching {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node {
     /// First and last uncertainty level it stands for.
-    pub levels: (LevelId, LevelId),
+    pub levels: (StratumId, StratumId),
     /// Mode, or memory, it belongs to.
     pub mode: ModeId,
     /// Where it is among the means of its levels, in [`Automaton::coordinates`].
@@ -103,7 +103,7 @@ pub struct Observed {
 impl Node {
     /// A node nothing is known of yet but its place and action.
     pub fn new(
-        levels: RangeInclusive<LevelId>,
+        levels: RangeInclusive<StratumId>,
         mode: ModeId,
         place: Place,
         action: ActionId,
@@ -124,7 +124,7 @@ impl Node {
 
 impl Node {
     /// How many levels it is away from one; 0 where it stands for it.
-    fn gap(&self, level: LevelId) -> usize {
+    fn gap(&self, level: StratumId) -> usize {
         let (first, last) = self.levels;
         first.saturating_sub(level).max(level.saturating_sub(last))
     }
@@ -213,14 +213,8 @@ impl Automaton {
                 .map(|action| action.name.clone())
                 .collect(),
             modes: model.modes.clone(),
-            levels: (0..mdp.levels().len())
-                .map(|level| {
-                    mdp.levels()
-                        .covariance(level)
-                        .transpose()
-                        .as_slice()
-                        .to_vec()
-                })
+            levels: (0..mdp.strata())
+                .map(|level| mdp.covariance(level).transpose().as_slice().to_vec())
                 .collect(),
             planned_value: None,
             coordinates: None,
@@ -232,7 +226,7 @@ impl Automaton {
 
     /// The node of a belief; `None` only without nodes.
     pub fn matched(&self, belief: &Belief) -> Option<NodeId> {
-        let candidates = self.candidates(belief.level, belief.mode);
+        let candidates = self.candidates(belief.stratum, belief.mode);
         match &self.coordinates {
             None => self.closest(candidates, &belief.mean),
             Some(coordinates) => self.closest(candidates, &coordinates.of(&belief.mean)),
@@ -247,7 +241,7 @@ impl Automaton {
 
     /// Nodes among which a belief of this level and mode finds its own. A level or mode without nodes borrows those of the
     /// nearest level in the same mode, then of any mode.
-    pub fn candidates(&self, level: LevelId, mode: ModeId) -> impl Iterator<Item = NodeId> {
+    pub fn candidates(&self, level: StratumId, mode: ModeId) -> impl Iterator<Item = NodeId> {
         let gap = move |node: &Node| (node.mode != mode, node.gap(level));
         let smallest = self.nodes.iter().map(gap).min();
         (0..self.nodes.len()).filter(move |&id| Some(gap(&self.nodes[id])) == smallest)
@@ -267,7 +261,7 @@ impl Automaton {
     /// without looking at the nodes of all other modes again at every level.
     pub(super) fn nearest_to_level(
         &self,
-        level: LevelId,
+        level: StratumId,
         own: &[NodeId],
     ) -> impl Iterator<Item = NodeId> {
         let gap = move |id: &&NodeId| self.nodes[**id].gap(level);

@@ -69,8 +69,8 @@ impl Automaton {
     fn at_level(&self, belief: &Belief) -> Vec<NodeId> {
         let stands = |node: &Node| {
             node.mode == belief.mode
-                && node.levels.0 <= belief.level
-                && belief.level <= node.levels.1
+                && node.levels.0 <= belief.stratum
+                && belief.stratum <= node.levels.1
         };
         (0..self.nodes.len())
             .filter(|&id| stands(&self.nodes[id]))
@@ -79,7 +79,7 @@ impl Automaton {
 
     fn push(&mut self, belief: &Belief, place: Place, action: ActionId, value: f64) -> NodeId {
         self.nodes.push(Node::new(
-            belief.level..=belief.level,
+            belief.stratum..=belief.stratum,
             belief.mode,
             place,
             action,

@@ -173,6 +173,19 @@ impl FilterTable {
         matrix(&self.a, n, n).at("A")?;
         matrix(&self.bu, sizes.actions, n).at("Bu")?;
         matrix(&self.h, m, n).at("H")?;
+        let begins = self.later.iter().map(|phase| phase.from);
+        let before: Vec<usize> = std::iter::once(0).chain(begins).collect();
+        let phases: Vec<_> = self.later.iter().zip(before).collect();
+        each(&phases, |(phase, before)| {
+            if phase.from <= *before {
+                let message = format!("{} where more than {before} belongs", phase.from);
+                return Err(Fault::new(message)).at("from");
+            }
+            matrix(&phase.a, n, n).at("A")?;
+            matrix(&phase.bu, sizes.actions, n).at("Bu")?;
+            matrix(&phase.h, m, n).at("H")
+        })
+        .at("later")?;
         some(&self.levels).at("levels")?;
         let classes = self.levels[0].steps.len();
         length(&self.classes, sizes.actions).at("classes")?;
@@ -202,8 +215,9 @@ impl LevelTable {
     fn check(&self, sizes: &Sizes, classes: usize, largest: f64) -> Checked {
         let n = sizes.states;
         length(&self.steps, classes).at("steps")?;
-        each(&self.steps, |StepTable { next, gain }| {
+        each(&self.steps, |StepTable { next, blind, gain }| {
             sizes.level(*next).at("next")?;
+            sizes.level(*blind).at("blind")?;
             matrix(gain, n, sizes.readings).at("gain")
         })
         .at("steps")?;

@@ -3,12 +3,12 @@
 use super::check::{At, Checked, Fault};
 use super::file::{
     CoordinateTable, Ends, FilterTable, LevelTable, MapTable, MemoryTable, NodeTable,
-    ObservedTable, PolicyTable, RecallTable, Rows, SideTable, StartTable, StepTable, SwitchTable,
-    WallsTable,
+    ObservedTable, PhaseTable, PolicyTable, RecallTable, Rows, SideTable, StartTable, StepTable,
+    SwitchTable, WallsTable,
 };
 use super::{Automaton, Coordinates, Node, Observed};
-use crate::belief::{Clusters, Filter, Recall, Switch};
-use crate::model::{Barriers, Interval, Region, Step, map};
+use crate::belief::{Clusters, Filter, Recall};
+use crate::model::{Barriers, Interval, Region, Step, Steps, Switch, map};
 
 /// Rows of a matrix that lies row by row in `numbers`.
 fn rows(numbers: &[f64], columns: usize) -> Rows {
@@ -122,19 +122,38 @@ impl FilterTable {
         let (classes, examples) = classes(filter);
         let step = |edge: usize| StepTable {
             next: filter.next[edge],
+            blind: filter.blind[edge],
             gain: transposed(&filter.gains[edge * n * m..(edge + 1) * n * m], n),
         };
         let level = |(level, covariance): (usize, &Vec<f64>)| LevelTable {
             covariance: rows(covariance, n),
+            time: filter.times[level],
             steps: examples
                 .iter()
                 .map(|action| step(level * actions + action))
                 .collect(),
         };
+        let mut a = filter.motion.chunks(n * n).map(|a| rows(a, n));
+        let mut bu = filter
+            .displacements
+            .chunks(actions * n)
+            .map(|bu| rows(bu, n));
+        let mut h = filter.sensor.chunks(m * n).map(|h| rows(h, n));
+        let mut part = || {
+            let parts = (a.next(), bu.next(), h.next());
+            let part = |part: Option<Rows>| part.unwrap_or_default();
+            (part(parts.0), part(parts.1), part(parts.2))
+        };
+        let (a, bu, h) = part();
+        let later = filter.later.iter().map(|&from| {
+            let (a, bu, h) = part();
+            PhaseTable { from, a, bu, h }
+        });
         Ok(Self {
-            a: rows(&filter.motion, n),
-            bu: rows(&filter.displacements, n),
-            h: rows(&filter.sensor, n),
+            a,
+            bu,
+            h,
+            later: later.collect(),
             classes,
             levels: covariances.iter().enumerate().map(level).collect(),
             walls: filter.walls.as_ref().map(|walls| WallsTable {
@@ -154,15 +173,28 @@ impl FilterTable {
             levels.flat_map(|level| self.classes.iter().map(|class| &level.steps[*class]))
         };
         let n = self.a.len();
+        let later: Vec<usize> = self.later.iter().map(|phase| phase.from).collect();
+        let times: Vec<usize> = self.levels.iter().map(|level| level.time).collect();
+        let phases = |first: &Rows, of: fn(&PhaseTable) -> &Rows| -> Vec<f64> {
+            let rest = self.later.iter().flat_map(|phase| of(phase).concat());
+            first.concat().into_iter().chain(rest).collect()
+        };
         Ok(Filter {
             states: n,
             readings: self.h.len(),
             start: (start.level, start.mode, start.mean),
             next: steps().map(|step| step.next).collect(),
+            blind: steps().map(|step| step.blind).collect(),
             gains: steps().flat_map(|step| columns(&step.gain)).collect(),
-            motion: self.a.concat(),
-            displacements: self.bu.concat(),
-            sensor: self.h.concat(),
+            phases: times
+                .iter()
+                .map(|time| later.partition_point(|from| from <= time))
+                .collect(),
+            times,
+            later,
+            motion: phases(&self.a, |phase| &phase.a),
+            displacements: phases(&self.bu, |phase| &phase.bu),
+            sensor: phases(&self.h, |phase| &phase.h),
             actions: self.bu.len(),
             switches: Vec::new(),
             walls: self
@@ -184,6 +216,7 @@ fn classes(filter: &Filter) -> (Vec<usize>, Vec<usize>) {
             let (a, b) = (level + a, level + b);
             let gain = |edge: usize| filter.gains[edge * size..(edge + 1) * size].iter();
             filter.next[a] == filter.next[b]
+                && filter.blind[a] == filter.blind[b]
                 && gain(a)
                     .map(|x| x.to_bits())
                     .eq(gain(b).map(|x| x.to_bits()))
@@ -254,6 +287,10 @@ impl SwitchTable {
             mode: switch.mode,
             region: switch.region.sides.iter().map(side).collect(),
             when: switch.when,
+            steps: (switch.steps != Steps::ALL).then_some((
+                switch.steps.from,
+                (switch.steps.until != usize::MAX).then_some(switch.steps.until),
+            )),
             becomes: switch.becomes,
         }
     }
@@ -269,6 +306,10 @@ impl SwitchTable {
                     .collect(),
             },
             when: self.when,
+            steps: self.steps.map_or(Steps::ALL, |(from, until)| Steps {
+                from,
+                until: until.unwrap_or(usize::MAX),
+            }),
             becomes: self.becomes,
         }
     }

@@ -107,6 +107,9 @@ pub(super) struct FilterTable {
     /// What is sensed of the state, m x n.
     #[serde(rename = "H")]
     pub h: Rows,
+    /// What takes the place of these three from later steps of an episode on, in the order of the steps. Default: nothing does.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub later: Vec<PhaseTable>,
     /// By action: its noise class. Actions of a class disturb state and sensor alike.
     pub classes: Vec<usize>,
     /// The uncertainty levels.
@@ -117,12 +120,33 @@ pub(super) struct FilterTable {
     pub walls: Option<WallsTable>,
 }
 
+/// Motion and sensor from a step of the episode on.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct PhaseTable {
+    /// The first step, at least 1 and more than that of the phase before.
+    #[schemars(range(min = 1))]
+    pub from: usize,
+    /// How the state moves on its own, n x n.
+    #[serde(rename = "A")]
+    pub a: Rows,
+    /// By action: how far it moves the state, n numbers.
+    #[serde(rename = "Bu")]
+    pub bu: Rows,
+    /// What is sensed of the state, m x n.
+    #[serde(rename = "H")]
+    pub h: Rows,
+}
+
 /// An uncertainty level.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub(super) struct LevelTable {
     /// Covariance of the belief, n x n. Running the policy does not need it.
     pub covariance: Rows,
+    /// The step of an episode at which it is held, counted from 0, up to the last step at which anything changes with the step. Default: 0.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub time: usize,
     /// By noise class: what a step does.
     #[schemars(length(min = 1))]
     pub steps: Vec<StepTable>,
@@ -134,6 +158,8 @@ pub(super) struct LevelTable {
 pub(super) struct StepTable {
     /// The level afterwards.
     pub next: usize,
+    /// The level afterwards where the reading is missing.
+    pub blind: usize,
     /// Gain K, n x m.
     pub gain: Rows,
 }
@@ -185,8 +211,15 @@ pub(super) struct SwitchTable {
     /// Whether the mean must be there before the step, or after it. Changes before come first.
     #[schemars(with = "Moment")]
     pub when: When,
+    /// Steps of an episode in which it happens: the first, and the first after them. Default: all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<(usize, Option<usize>)>,
     /// Mode afterwards.
     pub becomes: usize,
+}
+
+fn is_zero(number: &usize) -> bool {
+    *number == 0
 }
 
 /// When a mean is looked at.

@@ -1,6 +1,6 @@
 //! An automaton laid out flat, to be run: a step allocates nothing.
 
-use crate::belief::{Belief, Filter};
+use crate::belief::{Belief, Filter, Reading};
 use crate::model::ActionId;
 use crate::policy::{Automaton, Coordinates, MOST_COORDINATES, Matching, NodeId, Place, Policy};
 
@@ -97,16 +97,16 @@ impl AutomatonRunner {
         self.decide_at(&self.belief)
     }
 
-    /// Takes in what was sensed (length `m`) after an action.
-    pub fn observe(&mut self, action: ActionId, observation: &[f64]) {
+    /// Takes in what was sensed after an action.
+    pub fn observe<'a>(&mut self, action: ActionId, reading: impl Into<Reading<'a>>) {
         self.filter
-            .update(&mut self.belief, action, observation, &mut self.scratch);
+            .update(&mut self.belief, action, reading, &mut self.scratch);
     }
 
     fn decide_at(&self, belief: &Belief) -> (NodeId, ActionId) {
         let (from, to) = self
             .ranges
-            .get(belief.mode * self.levels + belief.level)
+            .get(belief.mode * self.levels + belief.stratum)
             .copied()
             .unwrap_or((0, 0));
         if from == to {

@@ -43,6 +43,9 @@ pub(super) struct ModelFile {
     pub motion: MotionTable,
     /// What the agent senses.
     pub sensor: SensorTable,
+    /// How state and sensor change in the course of an episode, in the order of the steps. Default: they do not.
+    #[serde(default)]
+    pub later: Vec<LaterTable>,
     /// The actions by name, at least one. Between actions that are equally good the first in the file is taken.
     #[schemars(with = "std::collections::BTreeMap<String, ActionTable>")]
     pub actions: Named<ActionTable>,
@@ -133,6 +136,49 @@ pub(super) struct SensorTable {
     pub h: Option<Rows>,
     /// Covariance of n, m x m.
     pub noise: Rows,
+    /// Probability that there is a reading after a step, in [0, 1]. The agent knows when one is missing. Default: 1.
+    pub present: Option<f64>,
+}
+
+/// Motion and sensor from a step of the episode on. What is not given stays as it was before.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct LaterTable {
+    /// The first step, counted from 0; at least 1.
+    pub from: u64,
+    /// What changes about the motion.
+    #[serde(default)]
+    pub motion: LaterMotionTable,
+    /// What changes about the sensor.
+    #[serde(default)]
+    pub sensor: LaterSensorTable,
+}
+
+/// What changes about the motion.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct LaterMotionTable {
+    /// How the state moves on its own, n x n.
+    #[serde(rename = "A")]
+    pub a: Option<Rows>,
+    /// How controls move the state, n x p.
+    #[serde(rename = "B")]
+    pub b: Option<Rows>,
+    /// Covariance of v, n x n.
+    pub noise: Option<Rows>,
+}
+
+/// What changes about the sensor.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct LaterSensorTable {
+    /// What is sensed of the state, m x n, with as many readings as before.
+    #[serde(rename = "H")]
+    pub h: Option<Rows>,
+    /// Covariance of n, m x m.
+    pub noise: Option<Rows>,
+    /// Probability that there is a reading after a step, in [0, 1].
+    pub present: Option<f64>,
 }
 
 /// An action.

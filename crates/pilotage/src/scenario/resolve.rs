@@ -67,16 +67,19 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
         },
         motion: names.true_motion(&file.world.motion)?,
     };
+    let sensor = Sensor {
+        h: match &file.sensor.h {
+            Some(rows) => matrix(rows, Path::new("sensor").key("H"))?,
+            None => DMatrix::identity(file.state.names.len(), file.state.names.len()),
+        },
+        noise: matrix(&file.sensor.noise, Path::new("sensor").key("noise"))?,
+        present: file.sensor.present.unwrap_or(1.0),
+    };
     let model = Model {
         state: state_variables(&file.state, map.as_ref())?,
         start: names.start(&file.start, Path::new("start"))?,
-        sensor: Sensor {
-            h: match &file.sensor.h {
-                Some(rows) => matrix(rows, Path::new("sensor").key("H"))?,
-                None => DMatrix::identity(file.state.names.len(), file.state.names.len()),
-            },
-            noise: matrix(&file.sensor.noise, Path::new("sensor").key("noise"))?,
-        },
+        later: later(&file, &motion, &sensor)?,
+        sensor,
         actions: file
             .actions
             .0
@@ -488,6 +491,41 @@ fn motion(file: &ModelFile) -> Result<Motion, Fault> {
             .unwrap_or_else(|| DMatrix::identity(variables, variables)),
         noise: needed("noise", &table.noise)?,
     })
+}
+
+/// The later phases; each has from the one before what it does not state.
+fn later(file: &ModelFile, motion: &Motion, sensor: &Sensor) -> Result<Vec<Phase>, Fault> {
+    let (mut motion, mut sensor) = (motion.clone(), sensor.clone());
+    let mut phases = Vec::with_capacity(file.later.len());
+    for (i, table) in file.later.iter().enumerate() {
+        let path = |table: &str, key: &str| Path::new("later").index(i).key(table).key(key);
+        let given = |rows: &Option<Rows>, now: &mut DMatrix<f64>, path: Path| {
+            if let Some(given) = optional_matrix(rows, path)? {
+                *now = given;
+            }
+            Ok(())
+        };
+        given(&table.motion.a, &mut motion.a, path("motion", "A"))?;
+        given(&table.motion.b, &mut motion.b, path("motion", "B"))?;
+        given(
+            &table.motion.noise,
+            &mut motion.noise,
+            path("motion", "noise"),
+        )?;
+        given(&table.sensor.h, &mut sensor.h, path("sensor", "H"))?;
+        given(
+            &table.sensor.noise,
+            &mut sensor.noise,
+            path("sensor", "noise"),
+        )?;
+        sensor.present = table.sensor.present.unwrap_or(sensor.present);
+        phases.push(Phase {
+            from: usize::try_from(table.from).unwrap_or(usize::MAX),
+            motion: motion.clone(),
+            sensor: sensor.clone(),
+        });
+    }
+    Ok(phases)
 }
 
 fn no_cart_pole(path: Path) -> Fault {

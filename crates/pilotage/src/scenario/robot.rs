@@ -121,7 +121,7 @@ impl Robot {
     /// An action takes a number of ticks that ends.
     fn check_ticks(&self, model: &Model, path: impl Fn(&str) -> Path) -> Result<(), Fault> {
         const MOST: f64 = 1e5;
-        let way = |action| model.displacement(action).norm() * self.cell;
+        let way = |action| model.displacement(action, 0).norm() * self.cell;
         let longest = (0..model.actions.len()).map(way).fold(0.0, f64::max);
         // Half a turn, and the way at half the speed.
         let seconds = (std::f64::consts::PI * self.axle + 2.0 * longest) / self.speed + 1.0;
@@ -148,7 +148,8 @@ impl Robot {
             ));
         }
         for (i, width) in arena.iter().enumerate().take(model.state_dim()) {
-            let steps = (0..model.actions.len()).map(|action| model.displacement(action)[i].abs());
+            let steps =
+                (0..model.actions.len()).map(|action| model.displacement(action, 0)[i].abs());
             let longest = steps.fold(0.0, f64::max) * self.cell;
             if width - across < longest {
                 return Err(Fault::new(

@@ -14,6 +14,13 @@ impl Scenario {
         self.model.validate()?;
         let model = &self.model;
         let path = Path::new("world");
+        if self.truth.simulator != Simulator::Linear && !model.later.is_empty() {
+            return Err(Fault::of_key(
+                Path::new("later"),
+                "the simulator has its own motion, the same at every step",
+                "delete this table, or `world.kind`",
+            ));
+        }
         if let Simulator::CartPole(parameters) = &self.truth.simulator {
             parameters.validate(&path.clone().key("cart-pole"))?;
             if (model.state_dim(), model.motion.b.ncols()) != (4, 1) {

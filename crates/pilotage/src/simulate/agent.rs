@@ -1,6 +1,6 @@
 //! Agents: a belief and a policy, put together so that they can act.
 
-use crate::belief::{Belief, Filter};
+use crate::belief::{Belief, Reading, Tracker, Tracking};
 use crate::model::ActionId;
 use crate::policy::Policy;
 
@@ -12,8 +12,8 @@ pub trait Agent: Send {
     /// Chooses an action.
     fn act(&mut self) -> ActionId;
 
-    /// Takes in what was sensed (length `m`) after the action.
-    fn observe(&mut self, action: ActionId, observation: &[f64]);
+    /// Takes in what was sensed after the action.
+    fn observe(&mut self, action: ActionId, reading: Reading<'_>);
 
     /// The belief it acts on now.
     fn belief(&self) -> &Belief;
@@ -24,41 +24,36 @@ pub trait Agent: Send {
     }
 }
 
-/// A Kalman filter and a policy.
-pub struct FilterAgent<'a> {
-    filter: &'a Filter,
+/// A tracker and a policy.
+pub struct TrackingAgent<'a> {
+    tracker: Box<dyn Tracker + 'a>,
     policy: &'a dyn Policy,
-    belief: Belief,
-    scratch: Vec<f64>,
 }
 
-impl<'a> FilterAgent<'a> {
+impl<'a> TrackingAgent<'a> {
     /// The agent at the start of an episode.
-    pub fn new(filter: &'a Filter, policy: &'a dyn Policy) -> Self {
+    pub fn new(tracking: &'a dyn Tracking, policy: &'a dyn Policy) -> Self {
         Self {
-            filter,
+            tracker: tracking.tracker(),
             policy,
-            belief: filter.initial(),
-            scratch: vec![0.0; filter.states()],
         }
     }
 }
 
-impl Agent for FilterAgent<'_> {
+impl Agent for TrackingAgent<'_> {
     fn reset(&mut self) {
-        self.filter.reset(&mut self.belief);
+        self.tracker.reset();
     }
 
     fn act(&mut self) -> ActionId {
-        self.policy.action(&self.belief)
+        self.policy.action(self.tracker.belief())
     }
 
-    fn observe(&mut self, action: ActionId, observation: &[f64]) {
-        self.filter
-            .update(&mut self.belief, action, observation, &mut self.scratch);
+    fn observe(&mut self, action: ActionId, reading: Reading<'_>) {
+        self.tracker.update(action, reading);
     }
 
     fn belief(&self) -> &Belief {
-        &self.belief
+        self.tracker.belief()
     }
 }

@@ -5,14 +5,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use serde::{Deserialize, Serialize};
 
 use super::estimate::{Estimate, Moments};
-use super::{Agent, Episode, FilterAgent, run_episode};
-use crate::belief::Filter;
+use super::{Agent, Episode, TrackingAgent, run_episode};
+use crate::belief::Tracking;
 use crate::error::{Error, Result};
 use crate::parallel;
 use crate::policy::Policy;
 use crate::progress::Progress;
 use crate::scenario::Scenario;
-use crate::world::{ProblemWorld, Streams};
+use crate::world::{Observation, ProblemWorld, Streams};
 
 /// How to evaluate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,7 +87,7 @@ const CHUNKS: usize = 1024;
 /// Runs the policy in the scenario's world. The same numbers for any number of threads.
 pub fn evaluate(
     scenario: &Scenario,
-    filter: &Filter,
+    tracking: &dyn Tracking,
     policy: &dyn Policy,
     options: Options,
     observer: &dyn Progress,
@@ -95,7 +95,7 @@ pub fn evaluate(
     summarise(options, observer, &|| {
         episodes(
             scenario,
-            Box::new(FilterAgent::new(filter, policy)),
+            Box::new(TrackingAgent::new(tracking, policy)),
             options,
         )
     })
@@ -104,7 +104,7 @@ pub fn evaluate(
 /// Discounted return of `first` less that of `second` in the same worlds with the same noise, a paired comparison.
 pub fn compare(
     scenario: &Scenario,
-    filter: &Filter,
+    tracking: &dyn Tracking,
     first: &dyn Policy,
     second: &dyn Policy,
     options: Options,
@@ -113,7 +113,7 @@ pub fn compare(
     let mut difference = Moments::default();
     let runner = || {
         let [mut first, mut second] = [first, second].map(|policy| {
-            let agent = Box::new(FilterAgent::new(filter, policy));
+            let agent = Box::new(TrackingAgent::new(tracking, policy));
             episodes(scenario, agent, options)
         });
         Box::new(move |episode| first(episode).discounted - second(episode).discounted) as Runner<_>
@@ -140,7 +140,7 @@ fn episodes<'a>(
     let model = &scenario.model;
     let limits = (model.episode.length, model.discount);
     let mut world = ProblemWorld::new(scenario);
-    let mut observation = vec![0.0; model.observation_dim()];
+    let mut observation = Observation::new(model.observation_dim());
     Box::new(move |episode| {
         run_episode(
             &mut world,

@@ -2,14 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Agent, Estimate, FilterAgent};
-use crate::belief::Filter;
+use super::{Agent, Estimate, TrackingAgent};
+use crate::belief::Tracking;
 use crate::model::{Model, Then};
 use crate::parallel;
 use crate::policy::Policy;
 use crate::progress::Progress;
 use crate::scenario::Scenario;
-use crate::world::{ProblemWorld, Streams, World};
+use crate::world::{Observation, ProblemWorld, Streams, World};
 
 /// How long to watch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,7 +83,7 @@ impl Life {
 /// numbers for any number of threads.
 pub fn life(
     scenario: &Scenario,
-    filter: &Filter,
+    tracking: &dyn Tracking,
     policy: &dyn Policy,
     options: LifeOptions,
     observer: &dyn Progress,
@@ -91,7 +91,7 @@ pub fn life(
     let done = std::sync::atomic::AtomicU64::new(0);
     let runs = parallel::map(options.runs, |run| {
         let mut world = ProblemWorld::new(scenario);
-        let mut agent = FilterAgent::new(filter, policy);
+        let mut agent = TrackingAgent::new(tracking, policy);
         let mut draws = Streams::new(options.seed, run as u64);
         let counted = run_lives(
             &mut world,
@@ -114,7 +114,7 @@ fn run_lives(
     model: &Model,
     steps: u64,
 ) -> Run {
-    let mut observation = vec![0.0; model.observation_dim()];
+    let mut observation = Observation::new(model.observation_dim());
     let mut run = Run {
         steps,
         failures: 0,
@@ -132,7 +132,7 @@ fn run_lives(
             run.early += u64::from(age <= EARLY);
         }
         match step.then {
-            Then::Continue => agent.observe(action, &observation),
+            Then::Continue => agent.observe(action, observation.reading()),
             Then::Restart => agent.reset(),
             Then::End => {
                 world.reset(draws);

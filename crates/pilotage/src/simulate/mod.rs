@@ -6,15 +6,15 @@ mod evaluate;
 mod life;
 pub mod wake_up;
 
-pub use agent::{Agent, FilterAgent};
+pub use agent::{Agent, TrackingAgent};
 pub use estimate::Estimate;
 pub(crate) use evaluate::summarise;
 pub use evaluate::{Difference, Evaluation, Lost, Options, compare, evaluate};
 pub use life::{Life, LifeOptions, Run, life};
 
-use crate::belief::is_kept;
+use crate::belief::{Reading, is_kept};
 use crate::model::{ActionId, Then};
-use crate::world::{Streams, World};
+use crate::world::{Observation, Streams, World};
 
 /// What one episode earned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,13 +44,13 @@ pub struct Moment<'a> {
     pub state: &'a [f64],
     /// True mode afterwards.
     pub mode: usize,
-    /// What was sensed afterwards.
-    pub observation: &'a [f64],
+    /// What was sensed afterwards; that of the step before where the episode ends or restarts.
+    pub reading: Reading<'a>,
     /// Whether the episode goes on.
     pub then: Then,
 }
 
-/// Runs one episode of at most `length` steps. `observation` is a buffer for the sensor's `m` readings.
+/// Runs one episode of at most `length` steps. `observation` is room for what is sensed.
 ///
 /// The order is that of POMDPs.jl: stop if the episode is over, act, collect the discounted reward, then update the belief. An agent
 /// whose mean has grown to [`crate::belief::LARGEST`] has no belief to act on: the episode ends there. What ending costs is paid after the last step.
@@ -58,7 +58,7 @@ pub fn run_episode(
     world: &mut dyn World,
     agent: &mut dyn Agent,
     draws: &mut Streams,
-    observation: &mut [f64],
+    observation: &mut Observation,
     (length, discount): (usize, f64),
     watch: &mut dyn FnMut(&Moment<'_>, &dyn Agent),
 ) -> Episode {
@@ -79,7 +79,7 @@ pub fn run_episode(
         episode.undiscounted += step.reward;
         weight *= discount;
         match step.then {
-            Then::Continue => agent.observe(action, observation),
+            Then::Continue => agent.observe(action, observation.reading()),
             Then::Restart => agent.reset(),
             Then::End => {}
         }
@@ -89,7 +89,7 @@ pub fn run_episode(
             reward: step.reward,
             state: world.state(),
             mode: world.mode(),
-            observation,
+            reading: observation.reading(),
             then: step.then,
         };
         watch(&moment, agent);

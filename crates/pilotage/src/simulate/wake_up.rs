@@ -8,14 +8,16 @@ use serde::{Deserialize, Serialize};
 
 use super::estimate::Moments;
 use super::evaluate::{Runner, run_all};
-use super::{Agent, Estimate, FilterAgent, run_episode};
-use crate::belief::{Belief, BeliefMdp, Filter, Tracker, Tracking};
+use super::{Agent, Estimate, TrackingAgent, run_episode};
+use crate::belief::{
+    Belief, BeliefMdp, Filter, HypothesisSettings, HypothesisTracker, Reading, Tracker,
+};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Region};
 use crate::policy::Policy;
 use crate::progress::Progress;
 use crate::scenario::{Scenario, Truth};
-use crate::world::{ProblemWorld, Streams};
+use crate::world::{Observation, ProblemWorld, Streams};
 
 /// Which action a lost agent takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,7 +35,7 @@ pub enum Choice {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// How hypotheses are pruned and merged.
-    pub tracking: Tracking,
+    pub tracking: HypothesisSettings,
     /// Which action is taken.
     pub choice: Choice,
     /// Kidnappings to run, at least 1.
@@ -45,7 +47,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            tracking: Tracking::default(),
+            tracking: HypothesisSettings::default(),
             choice: Choice::Valid,
             episodes: 10_000,
             seed: 1,
@@ -56,7 +58,7 @@ impl Default for Settings {
 /// An agent that follows several hypotheses and a policy for a single one.
 #[derive(Clone)]
 pub struct WakeUpAgent<'a> {
-    tracker: Tracker,
+    tracker: HypothesisTracker<'a>,
     policy: &'a dyn Policy,
     choice: Choice,
     actions: usize,
@@ -72,14 +74,15 @@ impl<'a> WakeUpAgent<'a> {
     /// The agent as it wakes up.
     ///
     /// # Errors
-    /// As [`Tracker::new`].
+    /// As [`HypothesisTracker::new`].
     pub fn new(
         mdp: &BeliefMdp,
         policy: &'a dyn Policy,
-        tracking: Tracking,
+        tracking: HypothesisSettings,
         choice: Choice,
     ) -> Result<Self> {
-        let tracker = Tracker::new(mdp, tracking)?;
+        let alike = |a: &Belief, b: &Belief| policy.action(a) == policy.action(b);
+        let tracker = HypothesisTracker::new(mdp, tracking, alike)?;
         let farthest = farthest(mdp, policy);
         Ok(Self {
             tracker,
@@ -94,7 +97,7 @@ impl<'a> WakeUpAgent<'a> {
     }
 
     /// The hypotheses it follows.
-    pub fn tracker(&self) -> &Tracker {
+    pub fn tracker(&self) -> &HypothesisTracker<'a> {
         &self.tracker
     }
 
@@ -147,8 +150,8 @@ impl Agent for WakeUpAgent<'_> {
         best.0
     }
 
-    fn observe(&mut self, action: ActionId, observation: &[f64]) {
-        self.tracker.update(action, observation, self.policy);
+    fn observe(&mut self, action: ActionId, reading: Reading<'_>) {
+        self.tracker.update(action, reading);
         self.steps += 1;
         let live = self.tracker.hypotheses();
         if live.len() == 1 && self.alone.is_none() {
@@ -257,7 +260,7 @@ pub fn measure(
 ) -> Result<WakeUp> {
     let goals = mdp.model().goals();
     check(mdp, &goals, settings)?;
-    mdp.levels().check(mdp.model())?;
+    mdp.check()?;
     let agent = WakeUpAgent::new(mdp, policy, settings.tracking, settings.choice)?;
     let told: Vec<Filter> = mdp
         .starts()
@@ -280,7 +283,7 @@ pub fn measure(
         Box::new(move |episode| {
             let draws = || Streams::new(settings.seed, episode);
             let of_lost = run(&mut world, &mut lost, draws(), goals, &scenario.model);
-            let mut knows = FilterAgent::new(&told[world.hypothesis()], policy);
+            let mut knows = TrackingAgent::new(&told[world.hypothesis()], policy);
             Pair {
                 lost: of_lost,
                 told: run(&mut world, &mut knows, draws(), goals, &scenario.model),
@@ -324,7 +327,7 @@ fn run(
     goals: &[Region],
     model: &crate::model::Model,
 ) -> Run {
-    let mut observation = vec![0.0; model.observation_dim()];
+    let mut observation = Observation::new(model.observation_dim());
     let mut reached = None;
     let episode = run_episode(
         world,

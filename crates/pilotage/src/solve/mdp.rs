@@ -178,7 +178,11 @@ impl StateMdp {
             Then::Restart => Next::Restart,
             Then::Continue => Next::Continue {
                 mode: outcome.mode,
-                centre: self.belief_mdp.predicted(state, action).as_slice().to_vec(),
+                centre: self
+                    .belief_mdp
+                    .predicted(0, state, action)
+                    .as_slice()
+                    .to_vec(),
             },
         };
         Entry { reward, next }
@@ -188,8 +192,11 @@ impl StateMdp {
     fn smoothers(&self) -> Vec<Option<Smoother>> {
         let classes = self.belief_mdp.levels().classes().iter();
         classes
-            .map(|class| match &self.space {
-                Space::Grid(grid) => Some(grid.smoother(&class.motion_noise)),
+            .map(|&example| match &self.space {
+                Space::Grid(grid) => {
+                    let noise = self.model().motion_noise(example, 0);
+                    Some(grid.smoother(noise))
+                }
                 Space::Points(_) => None,
             })
             .collect()
@@ -208,7 +215,7 @@ impl StateMdp {
             }
         });
         let future = parallel::map(modes * actions, |index| {
-            let class = self.belief_mdp.levels().class_of(index % actions);
+            let class = self.belief_mdp.class_of(index % actions);
             let look_up = |(state, entry): (usize, &Entry)| match &entry.next {
                 Next::End => 0.0,
                 Next::Restart => restart,
@@ -307,7 +314,7 @@ fn space(belief_mdp: &BeliefMdp, settings: &Settings) -> Result<Space> {
     let model = belief_mdp.model();
     let start = belief_mdp.start();
     if model.belief.hypotheses == HypothesisBelief::Collapse
-        && let Some(points) = belief_mdp.hypotheses(start.level, &start.mean)
+        && let Some(points) = belief_mdp.hypotheses(start.stratum, &start.mean)
     {
         let points = points.into_iter().map(|(_, point)| point.clone());
         return Ok(Space::Points(points.collect()));
@@ -320,8 +327,7 @@ fn space(belief_mdp: &BeliefMdp, settings: &Settings) -> Result<Space> {
     });
     // `V` and what it is smoothed to, `F` as it is and averaged over every level, and the entries.
     let tables = model.modes.len()
-        * (1 + belief_mdp.levels().classes().len()
-            + model.actions.len() * (1 + belief_mdp.levels().len() + 6 + n));
+        * (1 + belief_mdp.classes() + model.actions.len() * (1 + belief_mdp.strata() + 6 + n));
     let total = (points as u64).saturating_pow(n as u32);
     let numbers = total.saturating_mul(tables as u64);
     let mebibytes = numbers.saturating_mul(8) >> 20;
@@ -335,7 +341,7 @@ fn space(belief_mdp: &BeliefMdp, settings: &Settings) -> Result<Space> {
             .levels()
             .classes()
             .iter()
-            .map(|class| class.motion_noise[(variable, variable)])
+            .map(|&example| model.motion_noise(example, 0)[(variable, variable)])
             .fold(0.0, f64::max);
         Axis::around(bounds, variance.sqrt(), points)
     });

@@ -82,7 +82,10 @@ impl MostLikelyState {
     pub fn most_likely(&self, belief: &Belief) -> Vec<f64> {
         let points = match self.mdp.space() {
             Space::Grid(_) => None,
-            Space::Points(_) => self.mdp.belief_mdp().hypotheses(belief.level, &belief.mean),
+            Space::Points(_) => self
+                .mdp
+                .belief_mdp()
+                .hypotheses(belief.stratum, &belief.mean),
         };
         let heavier = |best: (f64, _), next: (f64, _)| if next.0 > best.0 { next } else { best };
         match points.into_iter().flatten().reduce(heavier) {

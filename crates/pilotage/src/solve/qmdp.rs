@@ -108,11 +108,11 @@ impl QmdpPolicy {
         let actions = belief_mdp.model().actions.len();
         let average = |action: ActionId| match self.mdp.space() {
             Space::Grid(grid) => {
-                let place = belief.mode * belief_mdp.levels().len() + belief.level;
+                let place = belief.mode * belief_mdp.strata() + belief.stratum;
                 grid.interpolate(&self.averaged[place * actions + action], &belief.mean)
             }
             Space::Points(_) => {
-                let weights = belief_mdp.hypotheses(belief.level, &belief.mean);
+                let weights = belief_mdp.hypotheses(belief.stratum, &belief.mean);
                 let future = self.mdp.future(belief.mode, action);
                 weights
                     .iter()
@@ -124,7 +124,8 @@ impl QmdpPolicy {
         };
         (0..actions)
             .map(|action| {
-                belief_mdp.reward(belief.mode, belief.level, &belief.mean, action) + average(action)
+                belief_mdp.reward(belief.mode, belief.stratum, &belief.mean, action)
+                    + average(action)
             })
             .collect()
     }

@@ -35,7 +35,20 @@ pub fn pays_afterwards(model: &Model) -> Option<String> {
 pub fn changes(model: &Model) -> Option<String> {
     let clock = model.clock();
     (clock > 0).then(|| {
-        format!("what it pays or changes depends on the step of the episode up to step {clock}, and this solver's values do not; use value-iteration")
+        format!("what it pays or changes, or how it moves or is sensed, depends on the step of the episode up to step {clock}, and this solver's values do not; use value-iteration")
+    })
+}
+
+/// Some solvers know one motion, one sensor, and readings that always come.
+pub fn steps_differ(model: &Model) -> Option<String> {
+    if let Some(phase) = model.later.first() {
+        return Some(format!(
+            "how it moves or is sensed changes at step {} ([[later]]), and this solver knows one motion and one sensor; use value-iteration",
+            phase.from
+        ));
+    }
+    model.misses_readings().then(|| {
+        "its readings may be missing (`present` in [sensor]), and this solver counts on each of them; use value-iteration".to_owned()
     })
 }
 

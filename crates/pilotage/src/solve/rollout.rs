@@ -1,14 +1,14 @@
 //! Beliefs a policy meets, sampled from the model.
 
-use crate::belief::{Belief, BeliefMdp, Filter};
+use crate::belief::{Belief, BeliefMdp, Filter, Reading};
 use crate::error::Result;
 use crate::model::ActionId;
 use crate::parallel;
 use crate::policy::Policy;
 use crate::scenario::Scenario;
-use crate::simulate::{Agent, FilterAgent, run_episode};
+use crate::simulate::{Agent, TrackingAgent, run_episode};
 use crate::solve::settings::ensure;
-use crate::world::{ProblemWorld, Streams, World};
+use crate::world::{Observation, ProblemWorld, Streams, World};
 
 /// One decision: where it was taken, what was done, and what was sensed on the way there.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +17,7 @@ pub struct Decision {
     pub belief: Belief,
     /// Action taken.
     pub action: ActionId,
-    /// What was sensed just before (length `m`); empty at the start of an episode.
+    /// What was sensed just before (length `m`); empty at the start of an episode, and where the reading was missing.
     pub observation: Vec<f64>,
 }
 
@@ -64,11 +64,11 @@ pub fn decisions(
         let mut world = ProblemWorld::new(&scenario);
         world.reset(&mut Streams::new(seed, episode as u64));
         let mut agent = Recorder {
-            inner: FilterAgent::new(&told[world.hypothesis().min(told.len() - 1)], policy),
+            inner: TrackingAgent::new(&told[world.hypothesis().min(told.len() - 1)], policy),
             sensed: Vec::new(),
             decisions: Vec::new(),
         };
-        let mut observation = vec![0.0; model.observation_dim()];
+        let mut observation = Observation::new(model.observation_dim());
         let mut draws = Streams::new(seed, episode as u64);
         run_episode(
             &mut world,
@@ -84,7 +84,7 @@ pub fn decisions(
 
 /// An agent that writes down its decisions.
 struct Recorder<'a> {
-    inner: FilterAgent<'a>,
+    inner: TrackingAgent<'a>,
     sensed: Vec<f64>,
     decisions: Vec<Decision>,
 }
@@ -106,9 +106,9 @@ impl Agent for Recorder<'_> {
         action
     }
 
-    fn observe(&mut self, action: ActionId, observation: &[f64]) {
-        self.sensed = observation.to_vec();
-        self.inner.observe(action, observation);
+    fn observe(&mut self, action: ActionId, reading: Reading<'_>) {
+        self.sensed = reading.values().map(<[f64]>::to_vec).unwrap_or_default();
+        self.inner.observe(action, reading);
     }
 
     fn belief(&self) -> &Belief {

@@ -39,10 +39,10 @@ pub fn plan(
 ) -> Result<Solution> {
     check_runs("runs", request.runs)?;
     let problem = Problem::new(model, request);
-    problem.mdp().levels().check(model)?;
+    problem.mdp().check()?;
     planner.accepts(model)?;
     if planner.makes_automaton(model) {
-        problem.mdp().levels().check_bounded(model)?;
+        problem.mdp().check_bounded()?;
     }
     let Plan {
         policy,
@@ -52,8 +52,8 @@ pub fn plan(
         remarks,
     } = planner.plan(&problem, observer)?;
     let levels = match &policy {
-        Found::Rule { mdp, .. } => mdp.levels().len(),
-        Found::Automaton(_) | Found::Control(_) => problem.mdp().levels().len(),
+        Found::Rule { mdp, .. } => mdp.strata(),
+        Found::Automaton(_) | Found::Control(_) => problem.mdp().strata(),
     };
     let policy = match (policy, request.form) {
         (Found::Control(controller), _) => Solved::Control(controller),
@@ -103,9 +103,9 @@ pub fn learn(
     let model = &scenario.model;
     check_runs("runs", request.runs)?;
     let problem = Problem::new(model, request);
-    problem.mdp().levels().check(model)?;
+    problem.mdp().check()?;
     learner.accepts(model)?;
-    problem.mdp().levels().check_bounded(model)?;
+    problem.mdp().check_bounded()?;
     let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(scenario)) };
     let lesson = learner.learn(&problem, &worlds, request.checkpoint.as_deref(), observer)?;
     Ok(Solution {
@@ -117,7 +117,7 @@ pub fn learn(
         },
         planned_value: None,
         policy_convergence_horizon: None,
-        levels: problem.mdp().levels().len(),
+        levels: problem.mdp().strata(),
         samples: Some(lesson.samples),
         learning: Some(lesson.learning),
         converged: lesson.converged,

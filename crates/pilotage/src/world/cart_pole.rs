@@ -1,8 +1,7 @@
 //! A cart with an inverted pole: the nonlinear equations of motion (Eq. 3.6 and 3.9).
 
-use super::Body;
 use super::linear::LinearSensor;
-use crate::model::{ActionId, ModeId};
+use super::{Body, Doing};
 use crate::random::{Rng, normal};
 use crate::scenario::{CartPole, Scenario};
 
@@ -30,14 +29,14 @@ impl CartAndPole {
 }
 
 impl Body for CartAndPole {
-    fn advance(&mut self, doing: (ModeId, ActionId), from: &[f64], to: &mut [f64], rng: &mut Rng) {
+    fn advance(&mut self, doing: Doing, from: &[f64], to: &mut [f64], rng: &mut Rng) {
         to.copy_from_slice(from);
-        let force = self.forces[doing.1] + self.force_sd * normal(rng);
+        let force = self.forces[doing.action] + self.force_sd * normal(rng);
         self.plant.advance(to, force);
     }
 
-    fn sense(&self, action: ActionId, state: &[f64], observation: &mut [f64], rng: &mut Rng) {
-        self.sensor.sense(action, state, observation, rng);
+    fn sense(&self, doing: Doing, state: &[f64], observation: &mut [f64], rng: &mut Rng) {
+        self.sensor.sense(doing, state, observation, rng);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Linear motion and sensing, `s' = A s + B u + v`, `o = H s + n`, with the true noise and controls where a scenario states them.
 
-use super::Body;
 use super::noise::Noise;
+use super::{Body, Doing};
 use crate::model::{ActionId, ModeId};
 use crate::random::Rng;
 use crate::scenario::Scenario;
@@ -9,93 +9,109 @@ use crate::scenario::Scenario;
 /// The linear sensor of a model.
 #[derive(Debug, Clone)]
 pub(super) struct LinearSensor {
-    /// `H`, row by row.
-    h: Vec<f64>,
-    /// By action.
-    noise: Vec<Noise>,
+    /// By phase: `H`, row by row.
+    h: Vec<Vec<f64>>,
+    /// By phase and action.
+    noise: Vec<Vec<Noise>>,
 }
 
 impl LinearSensor {
     pub fn new(scenario: &Scenario) -> Self {
         let model = &scenario.model;
         let actions = 0..model.actions.len();
+        let h = |step| model.sensor_at(step).h.transpose().as_slice().to_vec();
+        let noise = |step| {
+            let noise = |action| Noise::new(model.sensor_noise(action, step));
+            actions.clone().map(noise).collect()
+        };
         Self {
-            h: model.sensor.h.transpose().as_slice().to_vec(),
-            noise: actions
-                .map(|action| Noise::new(model.sensor_noise(action)))
-                .collect(),
+            h: model.phases().map(h).collect(),
+            noise: model.phases().map(noise).collect(),
         }
     }
 
-    pub fn sense(&self, action: ActionId, state: &[f64], observation: &mut [f64], rng: &mut Rng) {
-        let rows = self.h.chunks_exact(state.len());
+    pub fn sense(&self, doing: Doing, state: &[f64], observation: &mut [f64], rng: &mut Rng) {
+        let rows = self.h[doing.phase].chunks_exact(state.len());
         for (reading, row) in observation.iter_mut().zip(rows) {
             *reading = row.iter().zip(state).map(|(h, s)| h * s).sum();
         }
-        self.noise[action].add_to(observation, rng);
+        self.noise[doing.phase][doing.action].add_to(observation, rng);
     }
 }
 
 /// A state that moves and is sensed linearly.
 #[derive(Debug, Clone)]
 pub(super) struct Linear {
+    /// By phase.
+    motions: Vec<LinearMotion>,
+    sensor: LinearSensor,
+}
+
+#[derive(Debug, Clone)]
+struct LinearMotion {
     /// `A`, row by row.
     a: Vec<f64>,
     /// `B u`, by mode and action.
     displacements: Vec<Vec<Vec<f64>>>,
     /// By action.
     noise: Vec<Noise>,
-    sensor: LinearSensor,
 }
 
 impl Linear {
     pub fn new(scenario: &Scenario) -> Self {
-        let model = &scenario.model;
-        let actions = 0..model.actions.len();
-        let truly = |action| {
-            let stated = scenario.truth.motion.noise.as_ref();
-            Noise::new(stated.unwrap_or_else(|| model.motion_noise(action)))
-        };
+        let phases = scenario.model.phases();
         Self {
-            a: model.motion.a.transpose().as_slice().to_vec(),
-            displacements: (0..model.modes.len())
-                .map(|mode| {
-                    let displacement = |action| displacement(scenario, mode, action);
-                    actions.clone().map(displacement).collect()
-                })
+            motions: phases
+                .map(|step| LinearMotion::new(scenario, step))
                 .collect(),
-            noise: actions.map(truly).collect(),
             sensor: LinearSensor::new(scenario),
         }
     }
 }
 
-/// True `B u` of an action in a mode.
-fn displacement(scenario: &Scenario, mode: ModeId, action: ActionId) -> Vec<f64> {
+impl LinearMotion {
+    /// True motion of the phase that begins at a step.
+    fn new(scenario: &Scenario, step: usize) -> Self {
+        let model = &scenario.model;
+        let actions = 0..model.actions.len();
+        let truly = |action| {
+            let stated = scenario.truth.motion.noise.as_ref();
+            Noise::new(stated.unwrap_or_else(|| model.motion_noise(action, step)))
+        };
+        Self {
+            a: model.motion_at(step).a.transpose().as_slice().to_vec(),
+            displacements: (0..model.modes.len())
+                .map(|mode| {
+                    let displacement = |action| displacement(scenario, mode, action, step);
+                    actions.clone().map(displacement).collect()
+                })
+                .collect(),
+            noise: actions.map(truly).collect(),
+        }
+    }
+}
+
+/// True `B u` of an action in a mode at a step.
+fn displacement(scenario: &Scenario, mode: ModeId, action: ActionId, step: usize) -> Vec<f64> {
     let model = &scenario.model;
     let mut controls = scenario.truth.motion.controls.iter();
     let truly = controls.find(|control| control.applies(mode, action));
     let control = truly.map_or(&model.actions[action].control, |truly| &truly.control);
-    (&model.motion.b * control).as_slice().to_vec()
+    (&model.motion_at(step).b * control).as_slice().to_vec()
 }
 
 impl Body for Linear {
-    fn advance(
-        &mut self,
-        (mode, action): (ModeId, ActionId),
-        from: &[f64],
-        to: &mut [f64],
-        rng: &mut Rng,
-    ) {
-        let rows = self.a.chunks_exact(from.len());
-        let shifts = &self.displacements[mode][action];
+    fn advance(&mut self, doing: Doing, from: &[f64], to: &mut [f64], rng: &mut Rng) {
+        let motion = &self.motions[doing.phase];
+        let rows = motion.a.chunks_exact(from.len());
+        let shifts = &motion.displacements[doing.mode][doing.action];
         for ((value, row), shift) in to.iter_mut().zip(rows).zip(shifts) {
             *value = row.iter().zip(from).map(|(a, s)| a * s).sum::<f64>() + shift;
         }
-        self.noise[action].add_to(to, rng);
+        motion.noise[doing.action].add_to(to, rng);
     }
 
-    fn sense(&self, action: ActionId, state: &[f64], observation: &mut [f64], rng: &mut Rng) {
-        self.sensor.sense(action, state, observation, rng);
+    fn sense(&self, doing: Doing, state: &[f64], observation: &mut [f64], rng: &mut Rng) {
+        self.sensor.sense(doing, state, observation, rng);
     }
 }

@@ -6,11 +6,13 @@
 mod cart_pole;
 mod linear;
 mod noise;
+mod observation;
 mod problem;
 mod robot;
 
 pub use cart_pole::Plant;
 pub use noise::Noise;
+pub use observation::Observation;
 pub use problem::ProblemWorld;
 pub use robot::RobotArena;
 
@@ -22,9 +24,14 @@ pub trait World: Send {
     /// Draws a new true start.
     fn reset(&mut self, draws: &mut Streams);
 
-    /// Takes an action: pays `r(s, a)`, lets events happen, moves the state and writes what is then sensed (length `m`) to
-    /// `observation`. Nothing is sensed when the episode ends or restarts.
-    fn step(&mut self, action: ActionId, draws: &mut Streams, observation: &mut [f64]) -> Step;
+    /// Takes an action: pays `r(s, a)`, lets events happen, moves the state and writes what is then sensed to `observation`. Nothing
+    /// is written when the episode ends or restarts.
+    fn step(
+        &mut self,
+        action: ActionId,
+        draws: &mut Streams,
+        observation: &mut Observation,
+    ) -> Step;
 
     /// What is paid besides in the current state because an episode ends there, in units of reward.
     fn ending(&self) -> f64 {
@@ -38,6 +45,14 @@ pub trait World: Send {
     fn mode(&self) -> ModeId;
 }
 
+/// What an agent does: an action in a mode, in a phase of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Doing {
+    mode: ModeId,
+    action: ActionId,
+    phase: usize,
+}
+
 /// What moves and senses in a world. States have length `n`, observations `m`.
 trait Body: Send {
     /// Puts it down at a state, or as near as it can stand, and writes where that is.
@@ -45,11 +60,11 @@ trait Body: Send {
         let _ = state;
     }
 
-    /// Writes to `to` where an action in a mode leads from a state, noise included.
-    fn advance(&mut self, doing: (ModeId, ActionId), from: &[f64], to: &mut [f64], rng: &mut Rng);
+    /// Writes to `to` where an action leads from a state, noise included.
+    fn advance(&mut self, doing: Doing, from: &[f64], to: &mut [f64], rng: &mut Rng);
 
     /// Writes what is sensed in a state after an action, noise included.
-    fn sense(&self, action: ActionId, state: &[f64], observation: &mut [f64], rng: &mut Rng);
+    fn sense(&self, doing: Doing, state: &[f64], observation: &mut [f64], rng: &mut Rng);
 }
 
 /// What a step in the world did.

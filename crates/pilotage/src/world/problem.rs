@@ -4,7 +4,7 @@ use super::cart_pole::CartAndPole;
 use super::linear::Linear;
 use super::noise::Noise;
 use super::robot::Driven;
-use super::{Body, Step, Streams, World};
+use super::{Body, Doing, Observation, Step, Streams, World};
 use crate::model::{
     ActionId, Barriers, Effect, ModeId, Model, Outcome, StartHypothesis, StartShape, Tally, Then,
     When,
@@ -69,14 +69,33 @@ impl ProblemWorld {
         self.hypothesis
     }
 
-    fn move_on(&mut self, mode: ModeId, action: ActionId, draws: &mut Streams) {
-        let doing = (mode, action);
+    fn doing(&self, mode: ModeId, action: ActionId) -> Doing {
+        Doing {
+            mode,
+            action,
+            phase: self.model.phase(self.time),
+        }
+    }
+
+    fn move_on(&mut self, doing: Doing, draws: &mut Streams) {
         self.body
             .advance(doing, &self.state, &mut self.scratch, &mut draws.world);
         if let Some(walls) = &self.walls {
             walls.stop(&self.state, &mut self.scratch);
         }
         std::mem::swap(&mut self.state, &mut self.scratch);
+    }
+
+    /// Lets the current state be sensed, unless the reading is missing.
+    fn sense(&self, doing: Doing, draws: &mut Streams, observation: &mut Observation) {
+        let present = self.model.sensor_at(self.time).present;
+        // A reading that always comes takes no draw.
+        if present < 1.0 && uniform(&mut draws.sensor) >= present {
+            return observation.silence();
+        }
+        let values = observation.values();
+        self.body
+            .sense(doing, &self.state, values, &mut draws.sensor);
     }
 
     /// Takes in what the step does in the current state; what has happened, if an event has.
@@ -137,7 +156,12 @@ impl World for ProblemWorld {
         }
     }
 
-    fn step(&mut self, action: ActionId, draws: &mut Streams, observation: &mut [f64]) -> Step {
+    fn step(
+        &mut self,
+        action: ActionId,
+        draws: &mut Streams,
+        observation: &mut Observation,
+    ) -> Step {
         let doing = (self.mode, action);
         let mut tally = self.model.tally(self.mode, action);
         tally.reward += self.model.running_cost(&self.state, None, action);
@@ -147,7 +171,8 @@ impl World for ProblemWorld {
         if outcome.then != Then::Continue {
             return self.close(tally.reward, outcome.then, draws);
         }
-        self.move_on(doing.0, action, draws);
+        let moving = self.doing(doing.0, action);
+        self.move_on(moving, draws);
         if !self.model.episode.alive.contains(&self.state) {
             return Step {
                 reward: tally.reward + self.model.episode.failure_reward,
@@ -161,9 +186,8 @@ impl World for ProblemWorld {
                 return self.close(tally.reward, outcome.then, draws);
             }
         }
+        self.sense(moving, draws, observation);
         self.time += 1;
-        self.body
-            .sense(action, &self.state, observation, &mut draws.sensor);
         Step {
             reward: tally.reward,
             then: Then::Continue,

@@ -6,8 +6,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::Body;
-use crate::model::{ActionId, ModeId, Model};
+use super::{Body, Doing};
+use crate::model::Model;
 use crate::random::{Rng, normal};
 use crate::scenario::{Robot, Scenario};
 
@@ -33,7 +33,7 @@ impl Driven {
         Self {
             arena: RobotArena::new(robot, model),
             displacements: actions
-                .map(|action| model.displacement(action).as_slice().to_vec())
+                .map(|action| model.displacement(action, 0).as_slice().to_vec())
                 .collect(),
         }
     }
@@ -44,11 +44,12 @@ impl Body for Driven {
         self.arena.put(state);
     }
 
-    fn advance(&mut self, doing: (ModeId, ActionId), _: &[f64], to: &mut [f64], rng: &mut Rng) {
-        self.arena.carry_out(&self.displacements[doing.1], to, rng);
+    fn advance(&mut self, doing: Doing, _: &[f64], to: &mut [f64], rng: &mut Rng) {
+        self.arena
+            .carry_out(&self.displacements[doing.action], to, rng);
     }
 
-    fn sense(&self, _: ActionId, _: &[f64], observation: &mut [f64], rng: &mut Rng) {
+    fn sense(&self, _: Doing, _: &[f64], observation: &mut [f64], rng: &mut Rng) {
         self.arena.sense(observation, rng);
     }
 }

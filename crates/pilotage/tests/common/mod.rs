@@ -61,7 +61,9 @@ impl System {
             sensor: Sensor {
                 h: self.h.clone(),
                 noise: self.r.clone(),
+                present: 1.0,
             },
+            later: Vec::new(),
             actions: vec![action("STAY", DVector::zeros(n))],
             rewards: Vec::new(),
             events: Vec::new(),

@@ -13,10 +13,10 @@ use pilotage::model::Model;
 use pilotage::policy::{Automaton, AutomatonRunner, Coordinates, Matching};
 use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
-use pilotage::simulate::{FilterAgent, run_episode};
+use pilotage::simulate::{TrackingAgent, run_episode};
 use pilotage::solve::compile::{self, compile};
 use pilotage::solve::{Registry, Run, arkaq, grid, kafaq, value_iteration};
-use pilotage::world::{ProblemWorld, Streams, World};
+use pilotage::world::{Observation, ProblemWorld, Streams, World};
 
 pub use mutate::numbers;
 
@@ -117,10 +117,10 @@ fn models() -> Reader {
             model.episode.length = model.episode.length.min(5);
             let model = &scenario.model;
             let mdp = BeliefMdp::new(model);
-            if mdp.levels().check(model).is_err() {
+            if mdp.check().is_err() {
                 return false;
             }
-            let _ = mdp.levels().check_bounded(model);
+            let _ = mdp.check_bounded();
             for entry in registry.entries() {
                 let _ = entry.accepts(model);
             }
@@ -141,8 +141,8 @@ fn run(scenario: &Scenario, mdp: &BeliefMdp) {
     let model = &scenario.model;
     let filter = mdp.filter();
     let mut world = ProblemWorld::new(scenario);
-    let mut agent = FilterAgent::new(&filter, &First);
-    let mut observation = vec![0.0; model.observation_dim()];
+    let mut agent = TrackingAgent::new(&filter, &First);
+    let mut observation = Observation::new(model.observation_dim());
     let limits = (model.episode.length, model.discount);
     let mut draws = Streams::new(1, 0);
     run_episode(

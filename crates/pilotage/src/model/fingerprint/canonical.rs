@@ -160,6 +160,7 @@ impl Canonical for Model {
             start,
             motion,
             sensor,
+            later,
             actions,
             rewards,
             events,
@@ -182,6 +183,7 @@ impl Canonical for Model {
             .field("start", start)
             .field("motion", motion)
             .field("sensor", sensor)
+            .list("later", later)
             .field("actions", &actions)
             .list("rewards", rewards)
             .list("events", events)
@@ -235,8 +237,27 @@ impl Canonical for Motion {
 
 impl Canonical for Sensor {
     fn write(&self, digest: &mut Digest) {
-        let Self { h, noise } = self;
-        Fields(digest).field("H", h).field("noise", noise).end();
+        let Self { h, noise, present } = self;
+        Fields(digest)
+            .field("H", h)
+            .field("noise", noise)
+            .unless(&1.0, "present", present)
+            .end();
+    }
+}
+
+impl Canonical for Phase {
+    fn write(&self, digest: &mut Digest) {
+        let Self {
+            from,
+            motion,
+            sensor,
+        } = self;
+        Fields(digest)
+            .field("from", from)
+            .field("motion", motion)
+            .field("sensor", sensor)
+            .end();
     }
 }
 
@@ -256,7 +277,9 @@ impl Canonical for ActionIn<'_> {
             then,
         } = self.action;
         let (motion, sensor) = (&self.model.motion.noise, &self.model.sensor.noise);
-        let own = |noise: &'_ &DMatrix<f64>, default: &DMatrix<f64>| *noise != default;
+        // What is the default now need not be that of a later phase.
+        let changes = !self.model.later.is_empty();
+        let own = |noise: &'_ &DMatrix<f64>, default: &DMatrix<f64>| changes || *noise != default;
         Fields(digest)
             .field("name", name)
             .field("control", control)

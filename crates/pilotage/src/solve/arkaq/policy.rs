@@ -73,7 +73,7 @@ impl Policy {
         let entries = self.best.len() * task.actions();
         let least = settings.epoch.max(settings.epoch_per_entry * entries) as u64;
         let first = experience.samples;
-        let mut actor = Actor::new(task.worlds, filter);
+        let mut actor = Actor::new(task.worlds, filter, filter.readings());
         let mut reward = 0.0;
         self.visits.fill(0.0);
         while experience.samples - first < least {
@@ -96,7 +96,7 @@ impl Policy {
         self.table.forget_traces();
         let mut reward = 0.0;
         for _ in 0..task.mdp.model().episode.length {
-            let row = actor.belief.mode;
+            let row = actor.belief().mode;
             let temperature = self.temperature * experience.reward_range();
             let values = self.table.row(row);
             let action = boltzmann(values, temperature, settings.explore, &mut exploration);
@@ -107,7 +107,7 @@ impl Policy {
                 row,
                 action,
                 reward: step.reward,
-                next: (step.then != Then::End).then_some(actor.belief.mode),
+                next: (step.then != Then::End).then_some(actor.belief().mode),
             };
             self.table
                 .td_update(settings.rates(), task.discount(), transition);

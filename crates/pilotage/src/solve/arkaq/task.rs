@@ -39,8 +39,8 @@ impl<'a> Task<'a> {
             });
         }
         let mdp = BeliefMdp::new(&known(model));
-        mdp.levels().check(mdp.model())?;
-        mdp.levels().check_bounded(mdp.model())?;
+        mdp.check()?;
+        mdp.check_bounded()?;
         Ok(Self {
             filter: mdp.filter(),
             mdp,

@@ -123,7 +123,7 @@ fn explore(
     mut take: impl FnMut(Seen<'_>, &Experience) -> Result<bool>,
 ) -> Result<()> {
     let end = experience.samples + steps as u64;
-    let mut actor = Actor::new(task.worlds, &task.filter);
+    let mut actor = Actor::new(task.worlds, &task.filter, task.filter.readings());
     let mut more = true;
     while more && experience.samples < end {
         let (mut draws, mut exploration) = experience.next_episode(task.settings.seed);
@@ -131,7 +131,7 @@ fn explore(
         let mut seen = (None, 0.0);
         for _ in 0..task.mdp.model().episode.length {
             let (action, reward) = seen;
-            let mean = &actor.belief.mean;
+            let mean = &actor.belief().mean;
             more = take(
                 Seen {
                     mean,

@@ -71,7 +71,7 @@ impl<'a> Frame<'a> {
             }));
         }
         let displacements: Vec<_> = (0..model.actions.len())
-            .map(|action| model.displacement(action))
+            .map(|action| model.displacement(action, 0))
             .collect();
         let axis = |i: usize| match i < n {
             true => AxisModel {
@@ -141,11 +141,11 @@ impl<'a> Frame<'a> {
 }
 
 fn noise(model: &Model, action: ActionId) -> Result<[Noise; 2], String> {
-    let motion = model.motion_noise(action);
+    let motion = model.motion_noise(action, 0);
     if !is_diagonal(motion) {
         return Err("the motion noise of its variables is correlated".to_owned());
     }
-    let precision = precision(&model.sensor.h, model.sensor_noise(action))
+    let precision = precision(&model.sensor.h, model.sensor_noise(action, 0))
         .ok_or("its readings mix the state variables")?;
     let along = |i: usize| match i < model.state_dim() {
         true => Noise {

@@ -32,7 +32,7 @@ pub(super) fn bound(model: &Model) -> Result<f64, String> {
     };
     let n = model.state_dim();
     let at_rest = |action: ActionId| {
-        model.displacement(action).amax() == 0.0 && model.motion_noise(action).amax() == 0.0
+        model.displacement(action, 0).amax() == 0.0 && model.motion_noise(action, 0).amax() == 0.0
     };
     let still = model.motion.a == nalgebra::DMatrix::identity(n, n)
         && (0..model.actions.len()).all(at_rest);
@@ -88,7 +88,7 @@ fn effects(model: &Model, places: [&DVector<f64>; 2]) -> Result<Vec<Vec<Effect>>
 /// Squared distance of what is sensed at the two points, in units of the noise: endless where a reading without noise tells them
 /// apart.
 fn told(model: &Model, action: ActionId, apart: &DVector<f64>) -> f64 {
-    let noise = model.sensor_noise(action);
+    let noise = model.sensor_noise(action, 0);
     let eigen = noise.clone().symmetric_eigen();
     let noisy = square_root(noise).ncols();
     let floor = eigen.eigenvalues.amax() * 1e-14;

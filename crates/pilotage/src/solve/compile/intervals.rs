@@ -24,7 +24,7 @@ pub fn place(automaton: &mut Automaton, policy: &dyn Policy, band: &Band) {
         (low.min(x), high.max(x))
     });
     let at = |x: f64| Belief {
-        level: band.levels.1,
+        stratum: band.levels.1,
         mode: band.mode,
         mean: vec![x],
     };

@@ -14,7 +14,7 @@ pub use annotate::annotate;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-use crate::belief::{Belief, BeliefMdp, LevelId};
+use crate::belief::{Belief, BeliefMdp, StratumId};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, ModeId};
 use crate::policy::{Automaton, Matching, Policy};
@@ -47,7 +47,7 @@ impl Default for Settings {
 /// Decisions a policy took at neighbouring levels in one mode, to be served by the same nodes.
 struct Band {
     mode: ModeId,
-    levels: (LevelId, LevelId),
+    levels: (StratumId, StratumId),
     decisions: Vec<(Vec<f64>, ActionId)>,
     /// Means at which a belief may be besides, although the policy itself does not lead there.
     beside: Vec<Vec<f64>>,
@@ -74,7 +74,7 @@ impl Policy for Disturbed<'_> {
     fn action(&self, belief: &Belief) -> ActionId {
         const SHARE: u64 = 10;
         let bits = belief.mean.iter().map(|mean| mean.to_bits());
-        let numbers = bits.chain([belief.level as u64, belief.mode as u64]);
+        let numbers = bits.chain([belief.stratum as u64, belief.mode as u64]);
         let mixed = numbers.fold(self.seed, |hash, number| {
             let mixed = (hash ^ number).wrapping_mul(0x9e37_79b9_7f4a_7c15);
             mixed ^ (mixed >> 29)
@@ -126,7 +126,7 @@ fn meet(
     mdp: &BeliefMdp,
     policy: &dyn Policy,
     settings: &Settings,
-) -> BTreeMap<(ModeId, Reverse<LevelId>), Met> {
+) -> BTreeMap<(ModeId, Reverse<StratumId>), Met> {
     let disturbed = Disturbed {
         policy,
         actions: mdp.model().actions.len(),
@@ -137,7 +137,7 @@ fn meet(
         rollout::decisions(mdp, &mdp.filter(), policy, episodes, length, settings.seed).concat()
     };
     let mut met: BTreeMap<_, Met> = BTreeMap::new();
-    let place = |belief: &Belief| (belief.mode, Reverse(belief.level));
+    let place = |belief: &Belief| (belief.mode, Reverse(belief.stratum));
     for Decision { belief, action, .. } in run(policy, settings.episodes) {
         let met = met.entry(place(&belief)).or_default();
         met.decisions.push((belief.mean, action));
@@ -154,7 +154,11 @@ fn meet(
         }
         let decided = met.beside.iter().map(|mean| {
             let mean = mean.clone();
-            let belief = Belief { level, mode, mean };
+            let belief = Belief {
+                stratum: level,
+                mode,
+                mean,
+            };
             let action = policy.action(&belief);
             (belief.mean, action)
         });
@@ -168,18 +172,18 @@ fn meet(
 fn bands(
     mdp: &BeliefMdp,
     policy: &dyn Policy,
-    met: BTreeMap<(ModeId, Reverse<LevelId>), Met>,
+    met: BTreeMap<(ModeId, Reverse<StratumId>), Met>,
     slack: f64,
 ) -> Vec<Band> {
     let mut bands: Vec<Band> = Vec::new();
     for ((mode, Reverse(level)), Met { decisions, beside }) in met {
-        if mdp.levels().is_over(level) {
+        if mdp.is_over(level) {
             continue;
         }
         let joins = bands.last().is_some_and(|band| {
             let differs = |(mean, action): &&(Vec<f64>, ActionId)| {
                 policy.action(&Belief {
-                    level: band.levels.1,
+                    stratum: band.levels.1,
                     mode,
                     mean: mean.clone(),
                 }) != *action

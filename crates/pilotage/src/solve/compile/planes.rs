@@ -7,11 +7,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::belief::{BeliefMdp, LevelId};
+use crate::belief::{BeliefMdp, StratumId};
 use crate::policy::{Automaton, Matching, Node, Place};
 
 /// Levels from the first to the last of which the agent does the same at the same mean.
-pub type Group = (LevelId, LevelId);
+pub type Group = (StratumId, StratumId);
 
 /// A command `u = c - K m`.
 #[derive(Debug, Clone, PartialEq)]

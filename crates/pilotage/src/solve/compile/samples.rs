@@ -37,7 +37,7 @@ pub fn place(automaton: &mut Automaton, policy: &dyn Policy, band: &Band, slack:
 
 fn belief_of(band: &Band, mean: &[f64]) -> Belief {
     Belief {
-        level: band.levels.1,
+        stratum: band.levels.1,
         mode: band.mode,
         mean: mean.to_vec(),
     }

@@ -103,7 +103,8 @@ pub(super) fn extents(
                     })
                     .sum::<f64>()
             };
-            let moves = (0..model.actions.len()).map(|action| model.displacement(action).dot(&w));
+            let moves =
+                (0..model.actions.len()).map(|action| model.displacement(action, 0).dot(&w));
             let (least, most) = moves.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
                 (low.min(x), high.max(x))
             });

@@ -119,15 +119,15 @@ fn explore_level(
         let mut memory = 0;
         for passed in 0..=level {
             let action = any_action(actions, &mut exploration);
-            let cell = task.cell(&actor.belief.mean);
+            let cell = task.cell(&actor.belief().mean);
             let step = actor.step(action, &mut draws);
             experience.collect(step.reward);
             let next = draft
                 .memory
-                .next(memory, action, step.reward, &actor.belief.mean);
+                .next(memory, action, step.reward, &actor.belief().mean);
             if passed == level {
                 let future = match step.then {
-                    Then::Continue => values[next * cells + task.cell(&actor.belief.mean)],
+                    Then::Continue => values[next * cells + task.cell(&actor.belief().mean)],
                     Then::Restart | Then::End => 0.0,
                 };
                 let target = step.reward + task.discount() * future;

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::lattice::CellBox;
 use super::memory::{Kind, Memory};
 use super::task::{SOLVER, Task};
-use crate::belief::{Belief, Filter, Switch};
-use crate::model::{ActionId, Region as Place, When};
+use crate::belief::{Belief, Filter};
+use crate::model::{ActionId, Region as Place, Steps, Switch, When};
 use crate::policy::{Automaton, Matching, Node, Place as Segment};
 
 /// Nodes and edges before they are compiled.
@@ -134,6 +134,7 @@ impl Draft {
             mode: Some(edge.memory),
             region: task.lattice.place(&edge.cells),
             when: When::After,
+            steps: Steps::ALL,
             becomes: self.alias[edge.to],
         });
         let counted = match self.memory.kind {
@@ -146,6 +147,7 @@ impl Draft {
                 mode: Some(memory),
                 region: Place::everywhere(),
                 when: When::After,
+                steps: Steps::ALL,
                 becomes: self.alias[self.memory.without_event(memory, action)],
             })
         });

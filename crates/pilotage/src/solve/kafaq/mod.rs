@@ -139,7 +139,8 @@ impl Learner for Settings {
     }
 
     fn accepts(&self, model: &Model) -> Result<()> {
-        refuse_if(SOLVER, model, refusals::reward_missing(model))?;
+        let reason = refusals::reward_missing(model).or_else(|| refusals::steps_differ(model));
+        refuse_if(SOLVER, model, reason)?;
         let worlds =
             || -> Box<dyn World> { Box::new(ProblemWorld::new(&Scenario::assumed(model))) };
         course(model, &worlds, self).map(drop)

@@ -154,7 +154,7 @@ impl State {
                 break;
             }
             let regions = &mut self.regions;
-            let mean = actor.belief.mean.clone();
+            let mean = actor.belief().mean.clone();
             let current = find_current_segment(regions, &mean);
             if let Some((before, action, reward)) = previous {
                 let next = regions[current].values[regions[current].best()];
@@ -174,7 +174,7 @@ impl State {
                 acting = regions.len() - 1;
                 self.calm = 0;
             }
-            let at_steady = actor.belief.level == task.steady();
+            let at_steady = actor.belief().stratum == task.steady();
             let step = actor.step(action, &mut draws);
             self.experience.collect(step.reward);
             self.reward += step.reward;
@@ -219,7 +219,7 @@ impl State {
 /// The initial belief range, inside the world.
 fn first_region(task: &Task<'_>) -> Region {
     let (start, model) = (task.mdp.start(), task.mdp.model());
-    let covariance = task.mdp.levels().covariance(start.level);
+    let covariance = task.mdp.covariance(start.stratum);
     let half: Vec<f64> = (0..start.mean.len())
         .map(|i| START_WIDTH * covariance[(i, i)].sqrt())
         .collect();

@@ -214,24 +214,24 @@ impl Steady {
         self.table.forget_traces();
         let mut memory = 0;
         for _ in 0..task.mdp.model().episode.length {
-            let cell = task.cell(&actor.belief.mean);
+            let cell = task.cell(&actor.belief().mean);
             let row = self.row(task, memory, cell);
             let temperature = self.temperature * experience.reward_range();
             let explore = task.settings.explore;
             let action = boltzmann(self.table.row(row), temperature, explore, &mut exploration);
-            let at_steady = actor.belief.level == task.steady();
+            let at_steady = actor.belief().stratum == task.steady();
             let step = actor.step(action, &mut draws);
             experience.collect(step.reward);
             earned.steps += 1;
             earned.reward += step.reward;
-            self.note_event(task, experience, step.reward, &actor.belief.mean);
+            self.note_event(task, experience, step.reward, &actor.belief().mean);
             let next_memory = match step.then {
                 Then::Restart => 0,
                 _ => self
                     .memory
-                    .next(memory, action, step.reward, &actor.belief.mean),
+                    .next(memory, action, step.reward, &actor.belief().mean),
             };
-            let next_cell = task.cell(&actor.belief.mean);
+            let next_cell = task.cell(&actor.belief().mean);
             if at_steady {
                 let next = self.row(task, next_memory, next_cell);
                 let transition = Transition {

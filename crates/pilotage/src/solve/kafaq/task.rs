@@ -3,7 +3,7 @@
 use super::axes::{axes, extents};
 use super::lattice::{Lattice, boxes_needed, cells_needed};
 use super::settings::Settings;
-use crate::belief::{BeliefMdp, Filter, LevelId};
+use crate::belief::{BeliefMdp, Filter, StratumId};
 use crate::error::{Error, Result};
 use crate::model::{Fingerprint, Model};
 use crate::policy::{Automaton, Coordinates, MOST_COORDINATES};
@@ -27,7 +27,7 @@ pub struct Task<'a> {
     pub(super) lattice: Lattice,
     pub(super) filter: Filter,
     /// Levels from the start to the steady one.
-    pub(super) chain: Vec<LevelId>,
+    pub(super) chain: Vec<StratumId>,
     /// Fingerprint of the whole problem.
     pub(super) fingerprint: Fingerprint,
 }
@@ -39,7 +39,7 @@ impl<'a> Task<'a> {
         settings.validate()?;
         let fingerprint = model.fingerprint();
         let mdp = BeliefMdp::new(&known(model));
-        mdp.levels().check(mdp.model())?;
+        mdp.check()?;
         let refuse = |reason: String| Error::Unsupported {
             solver: SOLVER,
             model: model.name.clone(),
@@ -52,7 +52,7 @@ impl<'a> Task<'a> {
             )));
         }
         let chain = chain(&mdp).map_err(refuse)?;
-        let covariance = mdp.levels().covariance(chain[chain.len() - 1]);
+        let covariance = mdp.covariance(chain[chain.len() - 1]);
         let coordinates = axes(model);
         let extents = extents(model, coordinates.as_ref(), covariance);
         if let Some(known) = extents.iter().position(|extent| extent.deviation <= 0.0) {
@@ -107,7 +107,7 @@ impl<'a> Task<'a> {
     }
 
     /// The steady level.
-    pub fn steady(&self) -> LevelId {
+    pub fn steady(&self) -> StratumId {
         self.chain[self.chain.len() - 1]
     }
 
@@ -125,7 +125,7 @@ impl<'a> Task<'a> {
 
     /// Standard deviation along each variable at the steady level.
     pub fn deviations(&self) -> Vec<f64> {
-        let covariance = self.mdp.levels().covariance(self.steady());
+        let covariance = self.mdp.covariance(self.steady());
         (0..covariance.nrows())
             .map(|i| covariance[(i, i)].sqrt())
             .collect()
@@ -133,7 +133,7 @@ impl<'a> Task<'a> {
 
     /// An actor in a new world.
     pub fn actor(&self) -> Actor<'_> {
-        Actor::new(self.worlds, &self.filter)
+        Actor::new(self.worlds, &self.filter, self.filter.readings())
     }
 
     /// Runs an automaton, the same episodes at every trial.
@@ -144,14 +144,14 @@ impl<'a> Task<'a> {
 }
 
 /// Levels from the start to the steady one. They form a chain where all actions disturb motion and sensor alike.
-fn chain(mdp: &BeliefMdp) -> std::result::Result<Vec<LevelId>, String> {
+fn chain(mdp: &BeliefMdp) -> std::result::Result<Vec<StratumId>, String> {
     let levels = mdp.levels();
     if levels.classes().len() > 1 {
         return Err("its actions disturb motion or sensor in different ways, so that uncertainty has no one order of levels to be learned in; \
                     use value-iteration"
             .to_owned());
     }
-    let start = mdp.start().level;
+    let start = mdp.start().stratum;
     let Some(steady) = levels.steady(start, 0) else {
         return Err(format!(
             "its uncertainty does not settle within {} levels; set `belief.level_tolerance` higher",

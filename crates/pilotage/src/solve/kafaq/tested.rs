@@ -155,7 +155,8 @@ impl State {
             return None;
         }
         let model = task.mdp.model();
-        let still = (0..task.actions()).filter(|&action| model.displacement(action).amax() == 0.0);
+        let still =
+            (0..task.actions()).filter(|&action| model.displacement(action, 0).amax() == 0.0);
         let mut kinds = std::iter::once(Kind::Place).chain(still.map(Kind::PlaceAndParity));
         let kind = kinds.nth(self.tried.checked_sub(1)?)?;
         Some(Steady::new(

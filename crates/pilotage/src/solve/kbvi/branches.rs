@@ -78,7 +78,7 @@ impl Branches {
     /// Where observations gather around the true state and not around the mean (the tiger), the branch is searched once for each
     /// case, as the thesis does, and the cases are weighted by the belief.
     pub fn q_values(&self, belief: &Belief) -> Vec<f64> {
-        let hypotheses = self.mdp.hypotheses(belief.level, &belief.mean);
+        let hypotheses = self.mdp.hypotheses(belief.stratum, &belief.mean);
         let cases = match &hypotheses {
             Some(points) => points
                 .iter()
@@ -203,7 +203,7 @@ impl<'a> Search<'a> {
     }
 
     fn root(&mut self, belief: &Belief) -> Expected {
-        let certain = Outlook::certain(self.mdp, belief.level);
+        let certain = Outlook::certain(self.mdp, belief.stratum);
         let outlook = self
             .outlooks
             .iter()
@@ -315,8 +315,8 @@ impl<'a> Search<'a> {
         if then != Then::Continue {
             return then;
         }
-        let class = self.mdp.levels().class_of(action);
-        let mut mean = self.mdp.predicted(at.mean.as_slice(), action);
+        let class = self.mdp.class_of(action);
+        let mut mean = self.mdp.predicted(level, at.mean.as_slice(), action);
         if let Some(point) = self.case {
             let step = self
                 .mdp
@@ -362,10 +362,7 @@ impl<'a> Search<'a> {
     /// Whether the expected mean is inside the bounds, extended by 2.5 standard deviations of the level (Figure 5.5).
     fn within_reach(&self, at: &Expected) -> bool {
         let model = self.mdp.model();
-        let covariance = self
-            .mdp
-            .levels()
-            .covariance(self.outlooks[at.outlook].level);
+        let covariance = self.mdp.covariance(self.outlooks[at.outlook].level);
         let inside = |i: usize| {
             let margin = REACH * covariance[(i, i)].sqrt();
             let bounds = model.state[i].bounds;

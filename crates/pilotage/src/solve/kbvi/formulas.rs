@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::belief::gaussian::{gauss_hermite, normal_cdf, normal_density, region_probability};
 use crate::belief::kalman::square_root;
-use crate::belief::{BeliefMdp, ClassId, LevelId};
+use crate::belief::{BeliefMdp, ClassId, StratumId};
 use crate::model::{ActionId, Interval, ModeId, Region};
 
 /// Which formulas to use.
@@ -62,7 +62,7 @@ pub enum IntegralFormula {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outlook {
     /// Uncertainty level.
-    pub level: LevelId,
+    pub level: StratumId,
     /// Covariance of the mean, `n x n`.
     pub covariance: DMatrix<f64>,
     /// Level's covariance and the mean's together, `n x n`: how uncertain the agent is now about where it will be.
@@ -71,8 +71,8 @@ pub struct Outlook {
 
 impl Outlook {
     /// The outlook of an agent whose mean is N(.., covariance) at a level.
-    pub fn new(mdp: &BeliefMdp, level: LevelId, covariance: DMatrix<f64>) -> Self {
-        let total = mdp.levels().covariance(level) + &covariance;
+    pub fn new(mdp: &BeliefMdp, level: StratumId, covariance: DMatrix<f64>) -> Self {
+        let total = mdp.covariance(level) + &covariance;
         Self {
             level,
             covariance,
@@ -81,7 +81,7 @@ impl Outlook {
     }
 
     /// The outlook of an agent that knows its mean.
-    pub fn certain(mdp: &BeliefMdp, level: LevelId) -> Self {
+    pub fn certain(mdp: &BeliefMdp, level: StratumId) -> Self {
         let n = mdp.model().state_dim();
         Self::new(mdp, level, DMatrix::zeros(n, n))
     }
@@ -101,18 +101,20 @@ impl Formulas {
         let step = mdp.levels().step(from.level, class);
         let (a, h) = (&model.motion.a, &model.sensor.h);
         let gain = &step.correction.gain;
-        let noise = &mdp.levels().classes()[class];
+        let action = mdp.levels().classes()[class];
+        let (motion_noise, sensor_noise) =
+            (model.motion_noise(action, 0), model.sensor_noise(action, 0));
         let carried = a * &from.covariance * a.transpose();
-        let told = gain * &noise.sensor_noise * gain.transpose();
+        let told = gain * sensor_noise * gain.transpose();
         let covariance = match (self.spread, known) {
             (SpreadFormula::Exact, false) => carried + step.correction.mean_covariance(),
             (SpreadFormula::Exact, true) => {
                 let keep = DMatrix::identity(a.nrows(), a.nrows()) - gain * h;
                 &keep * carried * keep.transpose() + told
             }
-            (SpreadFormula::Printed, false) => carried + &noise.motion_noise + told,
+            (SpreadFormula::Printed, false) => carried + motion_noise + told,
             (SpreadFormula::Printed, true) => {
-                let moved = carried + &noise.motion_noise;
+                let moved = carried + motion_noise;
                 let taken = gain * (h * &moved * h.transpose()) * gain.transpose();
                 moved + told - taken
             }
@@ -157,7 +159,7 @@ impl Formulas {
         mean: &DVector<f64>,
         region: &Region,
     ) -> f64 {
-        let covariance = mdp.levels().covariance(outlook.level);
+        let covariance = mdp.covariance(outlook.level);
         let side = |&(i, side): &(usize, Interval)| -> f64 {
             let lines = ramp_lines(side, covariance[(i, i)].sqrt());
             lines
@@ -172,7 +174,7 @@ impl Formulas {
 fn terms(
     mdp: &BeliefMdp,
     mode: ModeId,
-    level: LevelId,
+    level: StratumId,
     action: ActionId,
     probability: impl Fn(&Region) -> f64,
 ) -> f64 {

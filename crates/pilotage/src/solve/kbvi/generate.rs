@@ -11,11 +11,11 @@ use crate::parallel;
 use crate::policy::{Automaton, Matching, Policy, first_best};
 use crate::progress::Progress;
 use crate::scenario::Scenario;
-use crate::simulate::{FilterAgent, run_episode};
+use crate::simulate::{TrackingAgent, run_episode};
 use crate::solve::compile::annotate;
 use crate::solve::rollout::check_runs;
 use crate::solve::settings::ensure;
-use crate::world::{ProblemWorld, Streams};
+use crate::world::{Observation, ProblemWorld, Streams};
 
 /// Most steps that are looked ahead: the search is as deep.
 const MOST_HORIZON: usize = 1000;
@@ -159,8 +159,8 @@ fn run_once(planner: &Branches, settings: &Settings, run: u64) -> Vec<(Belief, A
         met: std::sync::Mutex::new(Vec::new()),
     };
     let filter = mdp.filter();
-    let mut agent = FilterAgent::new(&filter, &thinker);
-    let mut observation = vec![0.0; model.observation_dim()];
+    let mut agent = TrackingAgent::new(&filter, &thinker);
+    let mut observation = Observation::new(model.observation_dim());
     let mut draws = Streams::new(settings.seed, run);
     let length = (horizon + 1).min(model.episode.length);
     run_episode(

@@ -72,7 +72,9 @@ impl Settings for Kbvi {
 /// # Errors
 /// [`crate::Error::Unsupported`] with the reason, and what would do.
 pub fn accepts(model: &Model) -> Result<()> {
-    let reason = refusals::reward_missing(model).or_else(|| refusals::pays_afterwards(model));
+    let reason = refusals::reward_missing(model)
+        .or_else(|| refusals::pays_afterwards(model))
+        .or_else(|| refusals::steps_differ(model));
     refuse_if(SOLVER, model, reason)
 }
 

@@ -1,47 +1,44 @@
 //! An agent that acts: a world, the belief about it, and the part of a model that it is told.
 
-use crate::belief::{Belief, Filter};
+use crate::belief::{Belief, Tracker, Tracking};
 use crate::model::{ActionId, Model, Then};
 use crate::solve::learn::Worlds;
-use crate::world::{Step, Streams, World};
+use crate::world::{Observation, Step, Streams, World};
 
 /// A world and the belief about it.
 pub struct Actor<'a> {
     world: Box<dyn World>,
-    filter: &'a Filter,
-    pub belief: Belief,
-    scratch: Vec<f64>,
-    observation: Vec<f64>,
+    tracker: Box<dyn Tracker + 'a>,
+    observation: Observation,
 }
 
 impl<'a> Actor<'a> {
-    /// An actor in a new world, whose belief `filter` keeps.
-    pub fn new(worlds: &Worlds<'_>, filter: &'a Filter) -> Self {
+    /// An actor in a new world, with a sensor of so many readings.
+    pub fn new(worlds: &Worlds<'_>, tracking: &'a dyn Tracking, readings: usize) -> Self {
         Self {
             world: worlds(),
-            filter,
-            belief: filter.initial(),
-            scratch: vec![0.0; filter.states()],
-            observation: vec![0.0; filter.readings()],
+            tracker: tracking.tracker(),
+            observation: Observation::new(readings),
         }
+    }
+
+    /// What it believes.
+    pub fn belief(&self) -> &Belief {
+        self.tracker.belief()
     }
 
     /// Starts an episode.
     pub fn reset(&mut self, draws: &mut Streams) {
         self.world.reset(draws);
-        self.filter.reset(&mut self.belief);
+        self.tracker.reset();
     }
 
     /// Takes an action and what it brings into the belief.
     pub fn step(&mut self, action: ActionId, draws: &mut Streams) -> Step {
         let step = self.world.step(action, draws, &mut self.observation);
         match step.then {
-            Then::Continue => {
-                let (belief, scratch) = (&mut self.belief, &mut self.scratch);
-                self.filter
-                    .update(belief, action, &self.observation, scratch);
-            }
-            Then::Restart => self.filter.reset(&mut self.belief),
+            Then::Continue => self.tracker.update(action, self.observation.reading()),
+            Then::Restart => self.tracker.reset(),
             Then::End => {}
         }
         step

@@ -1,13 +1,13 @@
 //! Trials: what an automaton earns in the worlds it was learned in.
 
-use crate::belief::Belief;
 use crate::belief::gaussian::normal_cdf;
+use crate::belief::{Belief, Reading};
 use crate::model::Model;
 use crate::parallel;
 use crate::policy::{Automaton, AutomatonRunner};
 use crate::simulate::{Agent, Episode, run_episode};
 use crate::solve::learn::Worlds;
-use crate::world::Streams;
+use crate::world::{Observation, Streams};
 
 /// Trials are episodes of this number and up, which learning never reaches.
 const TRIALS: u64 = 1 << 40;
@@ -84,7 +84,7 @@ pub fn run_trial(
             controller: controller.clone(),
             visits: vec![0.0; automaton.nodes.len()],
         };
-        let mut observation = vec![0.0; model.observation_dim()];
+        let mut observation = Observation::new(model.observation_dim());
         let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(episodes);
         let returns: Vec<Episode> = range
             .map(|episode| {
@@ -134,8 +134,8 @@ impl Agent for Visitor {
         action
     }
 
-    fn observe(&mut self, action: usize, observation: &[f64]) {
-        self.controller.observe(action, observation);
+    fn observe(&mut self, action: usize, reading: Reading<'_>) {
+        self.controller.observe(action, reading);
     }
 
     fn belief(&self) -> &Belief {

@@ -73,7 +73,7 @@ impl LqgController {
         stages.reverse();
 
         let start = DVector::from_column_slice(&mdp.start().mean);
-        let mut covariance = mdp.levels().covariance(mdp.start().level).clone();
+        let mut covariance = mdp.covariance(mdp.start().stratum).clone();
         let noise = &model.motion.noise;
         let mut expected = (start.transpose() * &next * &start)[0] + (&next * &covariance).trace();
         let mut corrections = Vec::with_capacity(length);

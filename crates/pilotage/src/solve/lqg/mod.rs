@@ -20,6 +20,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Form;
+use super::refusals;
 use super::settings::{Settings, ensure};
 use super::solver::{Found, Plan, Planner, Problem, refuse_if};
 use crate::belief::kalman::symmetric;
@@ -64,7 +65,10 @@ impl Planner for Lqg {
     }
 
     fn accepts(&self, model: &Model) -> Result<()> {
-        refuse_if(SOLVER, model, use_of(model).err())
+        let reason = use_of(model)
+            .err()
+            .or_else(|| refusals::steps_differ(model));
+        refuse_if(SOLVER, model, reason)
     }
 
     fn plan(&self, problem: &Problem, _: &dyn Progress) -> Result<Plan> {

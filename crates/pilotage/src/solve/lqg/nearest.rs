@@ -94,7 +94,7 @@ impl NearestAction {
         let mut automaton = Automaton::new(mdp, super::SOLVER, Matching::Nearest);
         for (point, action) in [(&foot - &aside, *first), (&foot + &aside, *second)] {
             let place = Place::Point(point.as_slice().to_vec());
-            let levels = 0..=mdp.levels().len() - 1;
+            let levels = 0..=mdp.strata() - 1;
             automaton
                 .nodes
                 .push(Node::new(levels, mdp.start().mode, place, action, None));

@@ -11,7 +11,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::belief::gaussian::exit_probability;
-use crate::belief::{Belief, BeliefMdp, Filter, LevelId};
+use crate::belief::{Belief, BeliefMdp, Filter, StratumId};
 use crate::model::{Interval, Model, Region, StartHypothesis, StartShape};
 use crate::parallel;
 use crate::policy::Policy;
@@ -25,7 +25,7 @@ pub struct Runs {
     /// Keeps the belief that is acted on.
     agent: Filter,
     /// Who is told where each run begins; nobody where the agent's own belief is all there is to know.
-    observer: Option<Progress>,
+    observer: Option<Observer>,
     /// What the belief that tells of failures is made of: of the observer, or else the agent.
     covariances: Vec<DMatrix<f64>>,
     alive: Region,
@@ -37,7 +37,7 @@ pub struct Runs {
 
 /// A filter that begins with certainty.
 #[derive(Debug)]
-struct Progress {
+struct Observer {
     filter: Filter,
     /// Starts are drawn here.
     scenario: Scenario,
@@ -56,9 +56,9 @@ pub struct Sample {
 
 impl Runs {
     /// Runs that begin and stay at a level that repeats itself, from a mean (length `n`).
-    pub fn steady(mdp: &BeliefMdp, level: LevelId, mean: &[f64]) -> Self {
+    pub fn steady(mdp: &BeliefMdp, level: StratumId, mean: &[f64]) -> Self {
         let start = Belief {
-            level,
+            stratum: level,
             mode: mdp.start().mode,
             mean: mean.to_vec(),
         };
@@ -80,14 +80,14 @@ impl Runs {
             start: vec![certain],
             ..model.clone()
         });
-        let observer = Progress {
+        let observer = Observer {
             filter: told.filter(),
             scenario: Scenario::assumed(model),
         };
         Self::new(&told, mdp.filter(), Some(observer))
     }
 
-    fn new(mdp: &BeliefMdp, agent: Filter, observer: Option<Progress>) -> Self {
+    fn new(mdp: &BeliefMdp, agent: Filter, observer: Option<Observer>) -> Self {
         let (model, levels) = (mdp.model(), mdp.levels());
         let actions = 0..model.actions.len();
         let h = &model.sensor.h;
@@ -105,7 +105,7 @@ impl Runs {
             carried: (h * &model.motion.a).transpose().as_slice().to_vec(),
             pushed: actions
                 .clone()
-                .map(|action| (h * model.displacement(action)).as_slice().to_vec())
+                .map(|action| (h * model.displacement(action, 0)).as_slice().to_vec())
                 .collect(),
             innovations: (0..levels.len())
                 .map(|level| {
@@ -214,7 +214,7 @@ impl Runs {
             }
             let knows = told.as_ref().map_or(&held, |told| &told.belief);
             let failure =
-                exit_probability(&knows.mean, &self.covariances[knows.level], &self.alive);
+                exit_probability(&knows.mean, &self.covariances[knows.stratum], &self.alive);
             if visit(&knows.mean, failure, &mut fate) {
                 self.agent.reset(&mut held);
                 if let Some(told) = &mut told {
@@ -234,20 +234,20 @@ impl Runs {
         {
             *reading = pushed + row.iter().zip(&from.mean).map(|(a, m)| a * m).sum::<f64>();
         }
-        self.innovations[from.level][action].add_to(observation, rng);
+        self.innovations[from.stratum][action].add_to(observation, rng);
     }
 }
 
 /// An observer during a run.
 struct Told<'a> {
-    observer: &'a Progress,
+    observer: &'a Observer,
     belief: Belief,
     world: ProblemWorld,
     draws: Streams,
 }
 
 impl<'a> Told<'a> {
-    fn new(observer: &'a Progress, draws: Streams) -> Self {
+    fn new(observer: &'a Observer, draws: Streams) -> Self {
         let mut told = Self {
             belief: observer.filter.initial(),
             world: ProblemWorld::new(&observer.scenario),

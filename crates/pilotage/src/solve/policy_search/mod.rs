@@ -119,7 +119,8 @@ impl Planner for PolicySearch {
 
     fn accepts(&self, model: &Model) -> Result<()> {
         let mdp = BeliefMdp::new(model);
-        refuse_if(SOLVER, model, refusal(&mdp, self.aim(model)))
+        let reason = refusals::steps_differ(model).or_else(|| refusal(&mdp, self.aim(model)));
+        refuse_if(SOLVER, model, reason)
     }
 
     fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
@@ -190,7 +191,7 @@ fn refusal(mdp: &BeliefMdp, aim: Objective) -> Option<String> {
     }
     if model.modes.len() > 1 || !mdp.is_gaussian() {
         Some("its planes know nothing of modes, walls or hypotheses; state the problem without them, or use value-iteration".to_owned())
-    } else if mdp.levels().classes().len() > 1 {
+    } else if mdp.classes() > 1 {
         Some("its actions differ in their noise, so that its levels are no chain; give all actions the same noise, or use value-iteration".to_owned())
     } else if let Some((one, other)) = alike {
         Some(format!(

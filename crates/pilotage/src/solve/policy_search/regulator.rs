@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{Objective, PolicySearch};
-use crate::belief::{BeliefMdp, LevelId};
+use crate::belief::{BeliefMdp, StratumId};
 use crate::error::Result;
 use crate::model::{Interval, Model, Region};
 use crate::solve::compile::planes::{Command, Group};
@@ -133,7 +133,7 @@ pub fn groups_of_levels(mdp: &BeliefMdp, aim: Objective) -> Vec<Group> {
     let last = levels.len() - 1;
     let weights = state_weights(mdp.model(), aim);
     let uncertainty = |level| weights.component_mul(levels.covariance(level)).sum();
-    let excess = |level: LevelId| uncertainty(level) / uncertainty(last);
+    let excess = |level: StratumId| uncertainty(level) / uncertainty(last);
     let mut groups = Vec::new();
     let mut first = 0;
     for end in GROUPS_END {

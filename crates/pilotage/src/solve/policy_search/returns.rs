@@ -29,7 +29,7 @@ pub fn improve(search: &mut Search<'_>, numbers: &mut Numbers) -> Option<f64> {
     let trial = Trial::new(search);
     search.observer.note(&format!(
         "{} levels in {groups} groups, {} nodes; no grid, less than 16 MiB; at most {:.0} million steps to simulate",
-        search.mdp.levels().len(),
+        search.mdp.strata(),
         groups * search.mdp.model().actions.len(),
         trial.steps(search.settings.effort, groups > 1) / 1e6,
     ));

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::failure::{Runs, Sample};
 use super::refine::{Phase, refine};
 use super::{Objective, PolicySearch, SOLVER, regulator};
-use crate::belief::{BeliefMdp, LevelId};
+use crate::belief::{BeliefMdp, StratumId};
 use crate::error::Result;
 use crate::policy::{Automaton, AutomatonRunner};
 use crate::progress::Progress;
@@ -83,7 +83,7 @@ impl<'a> Search<'a> {
     }
 
     /// The level at which the agent spends its life.
-    pub fn steady(&self) -> LevelId {
+    pub fn steady(&self) -> StratumId {
         self.groups[self.groups.len() - 1].1
     }
 

@@ -28,7 +28,7 @@ pub fn improve(search: &mut Search<'_>, numbers: &mut Numbers) {
     search.begin(steady + first * usize::from(early));
     search.observer.note(&format!(
         "{} levels in {} groups, {} nodes; no grid, less than 16 MiB; about {:.0} million steps of belief to simulate",
-        search.mdp.levels().len(),
+        search.mdp.strata(),
         search.groups.len(),
         search.groups.len() * search.mdp.model().actions.len(),
         steps(search.settings.effort, early) / 1e6,

@@ -1,7 +1,7 @@
 //! Where the grid of value iteration lies, how fine it is and how much memory it takes.
 
 use super::SOLVER;
-use crate::belief::{BeliefMdp, LevelId};
+use crate::belief::{BeliefMdp, StratumId};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::{Map, Model, Region, WallBelief};
@@ -73,12 +73,13 @@ fn axis(mdp: &BeliefMdp, variable: usize, points: usize) -> Axis {
     if model.belief.walls == WallBelief::Clip {
         return Axis::new(bounds.low, bounds.high, points);
     }
-    let largest =
-        |level: LevelId, class: usize| mdp.mean_covariance(level, class)[(variable, variable)];
-    let levels = 0..mdp.levels().len();
-    let classes = mdp.levels().classes().len();
-    let variance = levels
-        .flat_map(|level| (0..classes).map(move |class| (level, class)))
+    let largest = |stratum: StratumId, class: usize| {
+        mdp.mean_covariance(stratum, class)[(variable, variable)]
+    };
+    let strata = 0..mdp.strata();
+    let classes = mdp.classes();
+    let variance = strata
+        .flat_map(|stratum| (0..classes).map(move |class| (stratum, class)))
         .map(|(l, c)| largest(l, c))
         .fold(0.0, f64::max);
     let axis = Axis::around(bounds, variance.sqrt(), points);
@@ -91,12 +92,16 @@ fn axis(mdp: &BeliefMdp, variable: usize, points: usize) -> Axis {
 /// The length of which all ways that actions take along a variable are multiples, where it moves by them alone.
 fn stride(model: &Model, variable: usize) -> Option<f64> {
     const FINEST: f64 = 1e-6;
-    let row = model.motion.a.row(variable);
-    let stays = row
-        .iter()
-        .enumerate()
-        .all(|(i, a)| *a == f64::from(i == variable));
-    let ways = (0..model.actions.len()).map(|action| model.displacement(action)[variable].abs());
+    let stays = model.phases().all(|step| {
+        let row = model.motion_at(step).a.row(variable);
+        let mut entries = row.iter().enumerate();
+        entries.all(|(i, a)| *a == f64::from(i == variable))
+    });
+    let actions = 0..model.actions.len();
+    let ways = model.phases().flat_map(|step| {
+        let way = move |action| model.displacement(action, step)[variable].abs();
+        actions.clone().map(way)
+    });
     let ways: Vec<f64> = ways.filter(|way| *way > 0.0).collect();
     let largest = ways.iter().copied().fold(0.0, f64::max);
     let common = ways.iter().fold(0.0, |mut a: f64, &b| {
@@ -158,8 +163,8 @@ const COARSE: f64 = 1.0;
 /// How far apart points may be along a variable: the expected reward of a belief changes over a length of the narrowest place where
 /// something is paid, which `points` of them resolve, or over the belief's own width where that is more, which two do.
 fn scale(mdp: &BeliefMdp, variable: usize, points: f64) -> f64 {
-    let variance = |level| mdp.levels().covariance(level)[(variable, variable)];
-    let least = (0..mdp.levels().len())
+    let variance = |stratum| mdp.covariance(stratum)[(variable, variable)];
+    let least = (0..mdp.strata())
         .map(variance)
         .fold(f64::INFINITY, f64::min);
     let widths = paid_places(mdp.model()).map(|(_, region)| region.side(variable).width());
@@ -210,9 +215,10 @@ fn resolves(mdp: &BeliefMdp, axes: &[Axis]) -> Result<()> {
 
 /// Functions kept on the grid: values, expectations and probabilities of failing.
 fn functions(mdp: &BeliefMdp) -> u64 {
-    let (levels, classes) = (mdp.levels().len(), mdp.levels().classes().len());
+    let (strata, classes) = (mdp.strata(), mdp.classes());
     let limits = usize::from(!mdp.model().episode.alive.sides.is_empty());
-    (levels * (mdp.model().modes.len() * (1 + classes) + limits)) as u64
+    let expectations = classes * if mdp.model().misses_readings() { 2 } else { 1 };
+    (strata * (mdp.model().modes.len() * (1 + expectations) + limits)) as u64
 }
 
 /// Memory for the functions on a grid of so many points.

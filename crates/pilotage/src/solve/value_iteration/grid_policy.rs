@@ -1,4 +1,4 @@
-//! The value of beliefs `(mode, level, mean)` on a grid of means.
+//! The value of beliefs `(mode, stratum, mean)` on a grid of means.
 //!
 //! With an agent that is free to choose again after every observation,
 //!
@@ -7,9 +7,10 @@
 //! V(b)    = max_a Q(b, a)
 //! ```
 //!
-//! The expectation is taken first, once for each level and noise class: `W(x) = E V(x + K nu)` on the grid of means. Then
+//! The expectation is taken first, once for each stratum and noise class: `W(x) = E V(x + K nu)` on the grid of means. Then
 //! `Q` is one look-up of `W` at `A m + B u` for each action. Where the model has failure limits, the step may fail: with probability
-//! `f(b, a)` it earns the reward of failing and nothing more.
+//! `f(b, a)` it earns the reward of failing and nothing more. Where the reading may be missing, the mean is then where it was predicted:
+//! `V` itself is looked up there, at the stratum that the filter is left with.
 //!
 //! Levels are solved in the order in which the filter leaves them, last first, so only those that come back to themselves need
 //! iterating.
@@ -19,9 +20,9 @@ use petgraph::algo::kosaraju_scc;
 use petgraph::graph::{DiGraph, NodeIndex};
 
 use super::extent::{axes, knows_map, mebibytes};
-use crate::belief::{Belief, BeliefMdp, LevelId};
+use crate::belief::{Belief, BeliefMdp, StratumId};
 use crate::error::{Error, Result};
-use crate::model::{ActionId, Then};
+use crate::model::{ActionId, Outcome, Then};
 use crate::policy::Policy;
 use crate::progress::Progress;
 use crate::solve::grid::{Axis, Grid, Interpolation, Settings, Smoother};
@@ -33,12 +34,12 @@ use crate::solve::walled::WalledSmoother;
 pub struct GridPolicy {
     mdp: BeliefMdp,
     grid: Grid,
-    /// `V`, by mode and level.
+    /// `V`, by mode and stratum.
     pub(super) values: Vec<Vec<f64>>,
-    /// `discount * W`, by mode, level and noise class: what is still to come after an action of the class, by where the next
-    /// mean is centred.
+    /// `discount * W`, by mode, stratum and noise class: what is still to come after an action of the class, by where the next
+    /// mean is centred. Where readings may be missing, as many follow for the steps after which one is.
     pub(super) expected: Vec<Vec<f64>>,
-    /// Probability of being within the limits, by level; empty without limits.
+    /// Probability of being within the limits, by stratum; empty without limits.
     alive: Vec<Vec<f64>>,
     /// Value of the start belief.
     pub(super) start_value: f64,
@@ -47,7 +48,7 @@ pub struct GridPolicy {
     pub(super) remarks: Vec<String>,
     /// Whether the tolerance was reached within the allowed sweeps.
     pub converged: bool,
-    /// Sweeps over all groups of levels.
+    /// Sweeps over all groups of strata.
     pub sweeps: usize,
 }
 
@@ -65,7 +66,7 @@ pub fn solve(mdp: &BeliefMdp, settings: &Settings, observer: &dyn Progress) -> R
     Ok(policy)
 }
 
-/// Plans for episodes that are as long as the levels of the decision process say: for ever, unless they tell the time.
+/// Plans for episodes that are as long as the strata of the decision process say: for ever, unless they tell the time.
 pub(super) fn iterate(
     mdp: &BeliefMdp,
     settings: &Settings,
@@ -74,7 +75,7 @@ pub(super) fn iterate(
     let grid = Grid::new(axes(mdp, settings)?, Interpolation::Cubic);
     observer.note(&format!(
         "{} levels on a grid of {} points: {} MiB",
-        mdp.levels().len(),
+        mdp.strata(),
         grid.len(),
         mebibytes(mdp, grid.len() as u64)
     ));
@@ -91,50 +92,53 @@ pub(super) fn iterate(
     Ok(policy)
 }
 
-/// Probability of being within the limits at every point, by level; empty without limits.
+/// Kinds of expectations: after a reading, and after none where one may be missing.
+fn kinds(mdp: &BeliefMdp) -> usize {
+    if mdp.model().misses_readings() { 2 } else { 1 }
+}
+
+/// Probability of being within the limits at every point, by stratum; empty without limits.
 fn alive(mdp: &BeliefMdp, grid: &Grid) -> Vec<Vec<f64>> {
     if mdp.model().episode.alive.sides.is_empty() {
         return Vec::new();
     }
     let at_level =
-        |level| crate::parallel::map(grid.len(), |point| mdp.alive(level, &grid.point(point)));
-    (0..mdp.levels().len()).map(at_level).collect()
+        |stratum| crate::parallel::map(grid.len(), |point| mdp.alive(stratum, &grid.point(point)));
+    (0..mdp.strata()).map(at_level).collect()
 }
 
 /// Levels that lead back to each other, in an order such that every group only leads to itself and those before it.
-fn groups_of_levels(mdp: &BeliefMdp) -> Vec<Vec<LevelId>> {
-    let levels = mdp.levels();
+fn groups_of_levels(mdp: &BeliefMdp) -> Vec<Vec<StratumId>> {
     if mdp.model().restarts() {
-        return vec![(0..levels.len()).rev().collect()];
+        return vec![(0..mdp.strata()).rev().collect()];
     }
-    let classes = levels.classes().len();
-    let edges = (0..levels.len()).flat_map(|level| {
-        let next = move |class| levels.step(level, class).next as u32;
-        (0..classes).map(move |class| (level as u32, next(class)))
+    let edges = (0..mdp.strata()).flat_map(|stratum| {
+        let classes = 0..mdp.classes();
+        let after = classes.flat_map(move |class| {
+            let blind = (mdp.present(stratum) < 1.0).then(|| mdp.next_blind(stratum, class));
+            std::iter::once(mdp.next(stratum, class)).chain(blind)
+        });
+        after.map(move |next| (stratum as u32, next as u32))
     });
     let graph = DiGraph::<(), ()>::from_edges(edges);
     let group = |nodes: Vec<NodeIndex>| {
-        let mut group: Vec<LevelId> = nodes.into_iter().map(NodeIndex::index).collect();
+        let mut group: Vec<StratumId> = nodes.into_iter().map(NodeIndex::index).collect();
         group.sort_unstable();
         group
     };
-    // Not Tarjan's: that one recurses, and levels that lead to each other in a long line would overflow the stack.
+    // Not Tarjan's: that one recurses, and strata that lead to each other in a long line would overflow the stack.
     let groups = kosaraju_scc(&graph).into_iter().map(group);
     groups
-        .filter(|group| !group.iter().any(|level| levels.is_over(*level)))
+        .filter(|group| !group.iter().any(|stratum| mdp.is_over(*stratum)))
         .collect()
 }
 
 impl GridPolicy {
     fn new(mdp: BeliefMdp, grid: Grid) -> Self {
-        let (modes, levels, classes) = (
-            mdp.model().modes.len(),
-            mdp.levels().len(),
-            mdp.levels().classes().len(),
-        );
+        let (modes, strata, classes) = (mdp.model().modes.len(), mdp.strata(), mdp.classes());
         Self {
-            values: vec![vec![0.0; grid.len()]; modes * levels],
-            expected: vec![vec![0.0; grid.len()]; modes * levels * classes],
+            values: vec![vec![0.0; grid.len()]; modes * strata],
+            expected: vec![vec![0.0; grid.len()]; modes * strata * classes * kinds(&mdp)],
             alive: alive(&mdp, &grid),
             start_value: 0.0,
             promised: None,
@@ -200,35 +204,36 @@ impl GridPolicy {
         })
     }
 
-    /// Value of the levels at which an episode is over.
+    /// Value of the strata at which an episode is over.
     fn end_episodes(&mut self) {
-        for level in (0..self.mdp.levels().len()).filter(|level| self.mdp.levels().is_over(*level))
-        {
-            let worth = self.ending(level);
+        for stratum in (0..self.mdp.strata()).filter(|stratum| self.mdp.is_over(*stratum)) {
+            let worth = self.ending(stratum);
             for mode in 0..self.mdp.model().modes.len() {
-                let index = self.value_index(mode, level);
+                let index = self.value_index(mode, stratum);
                 self.values[index].clone_from(&worth);
             }
         }
     }
 
-    /// What ending an episode is worth at every point of a level.
-    pub(super) fn ending(&self, level: LevelId) -> Vec<f64> {
+    /// What ending an episode is worth at every point of a stratum.
+    pub(super) fn ending(&self, stratum: StratumId) -> Vec<f64> {
         crate::parallel::map(self.grid.len(), |point| {
-            self.mdp.terminal_cost(level, &self.grid.point(point))
+            self.mdp.terminal_cost(stratum, &self.grid.point(point))
         })
     }
 
-    pub(super) fn value_index(&self, mode: usize, level: LevelId) -> usize {
-        mode * self.mdp.levels().len() + level
+    pub(super) fn value_index(&self, mode: usize, stratum: StratumId) -> usize {
+        mode * self.mdp.strata() + stratum
     }
 
-    fn expected_index(&self, mode: usize, level: LevelId, class: usize) -> usize {
-        self.value_index(mode, level) * self.mdp.levels().classes().len() + class
+    /// Place of the expectation after a step of a class, sensed or blind.
+    fn expected_index(&self, mode: usize, stratum: StratumId, class: usize, blind: bool) -> usize {
+        let row = self.value_index(mode, stratum) * kinds(&self.mdp) + usize::from(blind);
+        row * self.mdp.classes() + class
     }
 
-    /// Value iteration on a group of levels until the change bounds the error by the tolerance.
-    fn solve_group(&mut self, group: &[LevelId], settings: &Settings) -> Result<()> {
+    /// Value iteration on a group of strata until the change bounds the error by the tolerance.
+    fn solve_group(&mut self, group: &[StratumId], settings: &Settings) -> Result<()> {
         let discount = self.mdp.model().discount;
         let backups = self.backups(group);
         let smoothers = self.smoothers(group);
@@ -236,11 +241,11 @@ impl GridPolicy {
         for _ in 0..settings.sweeps {
             self.sweeps += 1;
             let mut change = 0.0_f64;
-            for (&level, smoothers) in group.iter().zip(&smoothers) {
-                self.smooth(level, smoothers);
+            for (&stratum, smoothers) in group.iter().zip(&smoothers) {
+                self.smooth(stratum, smoothers);
             }
             for backup in &backups {
-                let index = self.value_index(backup.mode, backup.level);
+                let index = self.value_index(backup.mode, backup.stratum);
                 let fresh = self.back_up(backup);
                 change = self.change(backup, &fresh, change)?;
                 self.values[index] = fresh;
@@ -248,8 +253,8 @@ impl GridPolicy {
             self.start_value = self.value_at_start();
             let leads_outside_only = group.len() == 1 && self.leaves_itself(group[0]);
             if change <= target || leads_outside_only {
-                for (&level, smoothers) in group.iter().zip(&smoothers) {
-                    self.smooth(level, smoothers);
+                for (&stratum, smoothers) in group.iter().zip(&smoothers) {
+                    self.smooth(stratum, smoothers);
                 }
                 return Ok(());
             }
@@ -258,11 +263,11 @@ impl GridPolicy {
         Ok(())
     }
 
-    /// By level of a group and noise class: how the next mean spreads.
-    pub(super) fn smoothers(&self, group: &[LevelId]) -> Vec<Vec<Average>> {
-        let classes = 0..self.mdp.levels().classes().len();
-        let of = |&level: &LevelId| {
-            let class = |class| self.average(&self.mdp.mean_covariance(level, class));
+    /// By stratum of a group and noise class: how the next mean spreads.
+    pub(super) fn smoothers(&self, group: &[StratumId]) -> Vec<Vec<Average>> {
+        let classes = 0..self.mdp.classes();
+        let of = |&stratum: &StratumId| {
+            let class = |class| self.average(&self.mdp.mean_covariance(stratum, class));
             classes.clone().map(class).collect()
         };
         group.iter().map(of).collect()
@@ -270,7 +275,7 @@ impl GridPolicy {
 
     /// The larger of a change and that of the values of a backup, all of them finite.
     fn change(&self, backup: &Backup, fresh: &[f64], change: f64) -> Result<f64> {
-        let old = &self.values[self.value_index(backup.mode, backup.level)];
+        let old = &self.values[self.value_index(backup.mode, backup.stratum)];
         if let Some(point) = fresh.iter().position(|value| !value.is_finite()) {
             return Err(Error::NotFinite {
                 what: "the value of a belief".to_owned(),
@@ -278,7 +283,7 @@ impl GridPolicy {
                 place: format!(
                     "mean {:?} at uncertainty level {}",
                     self.grid.point(point),
-                    backup.level
+                    backup.stratum
                 ),
                 remedy: "its rewards, or what multiplies the state, are too large to add up; state them in other units",
             });
@@ -289,15 +294,18 @@ impl GridPolicy {
 
     pub(super) fn value_at_start(&self) -> f64 {
         let start = self.mdp.start();
-        let values = &self.values[self.value_index(start.mode, start.level)];
+        let values = &self.values[self.value_index(start.mode, start.stratum)];
         self.grid.interpolate(values, &start.mean)
     }
 
-    /// Whether no action comes back to the level, nor to the start.
-    fn leaves_itself(&self, level: LevelId) -> bool {
+    /// Whether no action comes back to the stratum, nor to the start.
+    fn leaves_itself(&self, stratum: StratumId) -> bool {
         !self.mdp.model().restarts()
-            && (0..self.mdp.levels().classes().len())
-                .all(|class| self.mdp.levels().step(level, class).next != level)
+            && (0..self.mdp.classes()).all(|class| {
+                self.mdp.next(stratum, class) != stratum
+                    && (self.mdp.present(stratum) == 1.0
+                        || self.mdp.next_blind(stratum, class) != stratum)
+            })
     }
 
     fn average(&self, spread: &DMatrix<f64>) -> Average {
@@ -308,21 +316,26 @@ impl GridPolicy {
         }
     }
 
-    pub(super) fn smooth(&mut self, level: LevelId, smoothers: &[Average]) {
+    pub(super) fn smooth(&mut self, stratum: StratumId, smoothers: &[Average]) {
         for mode in 0..self.mdp.model().modes.len() {
             for (class, smoother) in smoothers.iter().enumerate() {
-                let next = self.mdp.levels().step(level, class).next;
-                let index = self.expected_index(mode, level, class);
+                let next = self.mdp.next(stratum, class);
+                let index = self.expected_index(mode, stratum, class, false);
                 self.expected[index] = smoother.apply(&self.grid, &self.to_come(mode, next));
+                if self.mdp.present(stratum) < 1.0 {
+                    let next = self.mdp.next_blind(stratum, class);
+                    let index = self.expected_index(mode, stratum, class, true);
+                    self.expected[index] = self.to_come(mode, next);
+                }
             }
         }
     }
 
-    /// What a belief at a level is worth to a step that leads there: discounted, as far as the agent is alive to have it.
-    fn to_come(&self, mode: usize, level: LevelId) -> Vec<f64> {
+    /// What a belief at a stratum is worth to a step that leads there: discounted, as far as the agent is alive to have it.
+    fn to_come(&self, mode: usize, stratum: StratumId) -> Vec<f64> {
         let discount = self.mdp.model().discount;
-        let values = self.values[self.value_index(mode, level)].iter();
-        match self.alive.get(level) {
+        let values = self.values[self.value_index(mode, stratum)].iter();
+        match self.alive.get(stratum) {
             None => values.map(|value| discount * value).collect(),
             Some(alive) => values
                 .zip(alive)
@@ -332,22 +345,22 @@ impl GridPolicy {
     }
 
     /// Rewards and places to look up, which no sweep changes.
-    pub(super) fn backups(&self, group: &[LevelId]) -> Vec<Backup> {
+    pub(super) fn backups(&self, group: &[StratumId]) -> Vec<Backup> {
         let actions = self.mdp.model().actions.len();
         let mut backups = Vec::new();
-        for &level in group {
+        for &stratum in group {
             for mode in 0..self.mdp.model().modes.len() {
                 let entries = crate::parallel::map(self.grid.len(), |point| {
                     // Where no belief can be, the value is that of the belief kept instead.
                     let mean = self.mdp.confine(self.grid.point(point).into());
                     let mean = mean.as_slice();
                     (0..actions)
-                        .map(|action| self.backup_entry(mode, level, mean, action))
+                        .map(|action| self.backup_entry(mode, stratum, mean, action))
                         .collect()
                 });
                 backups.push(Backup {
                     mode,
-                    level,
+                    stratum,
                     entries,
                 });
             }
@@ -355,35 +368,55 @@ impl GridPolicy {
         backups
     }
 
-    fn backup_entry(&self, mode: usize, level: LevelId, mean: &[f64], action: ActionId) -> Entry {
-        let (mut reward, outcomes) = self.mdp.step(mode, level, mean, action);
+    fn backup_entry(
+        &self,
+        mode: usize,
+        stratum: StratumId,
+        mean: &[f64],
+        action: ActionId,
+    ) -> Entry {
+        let (mut reward, outcomes) = self.mdp.step(mode, stratum, mean, action);
         let model = self.mdp.model();
         let share = |then: Then| -> f64 {
             let such = outcomes.iter().filter(|outcome| outcome.then == then);
             such.map(|outcome| outcome.probability).sum()
         };
         if model.cost.is_some() {
-            reward += share(Then::End) * model.discount * self.mdp.terminal_cost(level, mean);
+            reward += share(Then::End) * model.discount * self.mdp.terminal_cost(stratum, mean);
         }
-        let survival = self.mdp.survival(level, mean, action);
+        let survival = self.mdp.survival(stratum, mean, action);
         let fails = 1.0 - survival.probability;
         if fails > 0.0 {
             reward += share(Then::Continue) * fails * model.episode.failure_reward;
         }
-        let class = self.mdp.levels().class_of(action);
-        let next: Vec<(usize, f64)> = outcomes
-            .iter()
-            .filter(|outcome| outcome.then == Then::Continue && survival.odds > 0.0)
-            .map(|outcome| {
-                let index = self.expected_index(outcome.mode, level, class);
-                (index, survival.odds * outcome.probability)
+        let class = self.mdp.class_of(action);
+        let next = |blind: bool, chance: f64| -> Vec<(usize, f64)> {
+            let goes_on = outcomes
+                .iter()
+                .filter(|outcome| outcome.then == Then::Continue && survival.odds > 0.0);
+            let look_up = |outcome: &Outcome| {
+                let index = self.expected_index(outcome.mode, stratum, class, blind);
+                (index, chance * survival.odds * outcome.probability)
+            };
+            goes_on.map(look_up).collect()
+        };
+        let present = self.mdp.present(stratum);
+        let blind = (present < 1.0).then(|| {
+            Box::new(Blind {
+                next: next(true, 1.0 - present),
+                mean: self
+                    .mdp
+                    .predicted(stratum, mean, action)
+                    .as_slice()
+                    .to_vec(),
             })
-            .collect();
+        });
+        let next = next(false, present);
         let centres = if next.is_empty() {
             Vec::new()
         } else {
             self.mdp
-                .centres(level, mean, action)
+                .centres(stratum, mean, action)
                 .into_iter()
                 .map(|(weight, centre)| (weight, centre.as_slice().to_vec()))
                 .collect()
@@ -393,6 +426,7 @@ impl GridPolicy {
             restart: share(Then::Restart),
             next,
             centres,
+            blind,
         }
     }
 
@@ -402,6 +436,11 @@ impl GridPolicy {
             for (weight, centre) in &entry.centres {
                 future +=
                     probability * weight * self.grid.interpolate(&self.expected[*expected], centre);
+            }
+        }
+        if let Some(Blind { next, mean }) = entry.blind.as_deref() {
+            for (expected, probability) in next {
+                future += probability * self.grid.interpolate(&self.expected[*expected], mean);
             }
         }
         entry.reward + future
@@ -418,7 +457,7 @@ impl GridPolicy {
 
     /// `Q(b, a)` by one step of look-ahead.
     pub fn q_value(&self, belief: &Belief, action: ActionId) -> f64 {
-        self.q(&self.backup_entry(belief.mode, belief.level, &belief.mean, action))
+        self.q(&self.backup_entry(belief.mode, belief.stratum, &belief.mean, action))
     }
 }
 
@@ -446,12 +485,20 @@ pub(super) struct Entry {
     restart: f64,
     next: Vec<(usize, f64)>,
     centres: Vec<(f64, Vec<f64>)>,
+    blind: Option<Box<Blind>>,
+}
+
+/// What is looked up, and where, if the reading is missing.
+#[derive(Debug)]
+struct Blind {
+    next: Vec<(usize, f64)>,
+    mean: Vec<f64>,
 }
 
 #[derive(Debug)]
 pub(super) struct Backup {
     pub mode: usize,
-    pub level: LevelId,
+    pub stratum: StratumId,
     /// By grid point, then action.
     pub entries: Vec<Vec<Entry>>,
 }

@@ -2,7 +2,7 @@
 //!
 //! Value iteration plans for ever. Where what comes after the end of an episode counts for next to nothing, that is all there is to it.
 //! Otherwise the plan is looked at over one episode, backwards from its end: what its own actions earn, and what the best would. If the
-//! difference matters, the plan is made anew with levels that tell the time, so that it may do something else near the end; if not, the
+//! difference matters, the plan is made anew with strata that tell the time, so that it may do something else near the end; if not, the
 //! actions stay as they are and only the promise is that of the episode.
 
 use super::grid_policy::{Average, Backup, GridPolicy, iterate};
@@ -72,8 +72,8 @@ impl GridPolicy {
         let largest = values.fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let ending = match self.mdp().model().cost {
             None => 0.0,
-            Some(_) => (0..self.mdp().levels().len())
-                .flat_map(|level| self.ending(level))
+            Some(_) => (0..self.mdp().strata())
+                .flat_map(|stratum| self.ending(stratum))
                 .fold(0.0_f64, |largest, value| largest.max(value.abs())),
         };
         let discount = self.mdp().model().discount;
@@ -88,8 +88,8 @@ impl GridPolicy {
         if (bytes >> 20) as u64 > settings.memory {
             return None;
         }
-        let levels: Vec<usize> = (0..self.mdp().levels().len()).collect();
-        let (smoothers, backups) = (self.smoothers(&levels), self.backups(&levels));
+        let strata: Vec<usize> = (0..self.mdp().strata()).collect();
+        let (smoothers, backups) = (self.smoothers(&strata), self.backups(&strata));
         let q = |policy: &Self, backup: &Backup, point: usize| -> Vec<f64> {
             let entries = backup.entries[point].iter();
             entries.map(|entry| policy.q(entry)).collect()
@@ -129,22 +129,22 @@ impl GridPolicy {
         smoothers: &[Vec<Average>],
         step: impl Fn(&Self) -> Vec<(&'a Backup, Vec<f64>)>,
     ) -> f64 {
-        let levels = self.mdp().levels().len();
-        for level in 0..levels {
-            let worth = self.ending(level);
+        let strata = self.mdp().strata();
+        for stratum in 0..strata {
+            let worth = self.ending(stratum);
             for mode in 0..self.mdp().model().modes.len() {
-                let index = self.value_index(mode, level);
+                let index = self.value_index(mode, stratum);
                 self.values[index].clone_from(&worth);
             }
         }
         for _ in 0..steps {
             self.start_value = self.value_at_start();
-            for (level, smoothers) in smoothers.iter().enumerate() {
-                self.smooth(level, smoothers);
+            for (stratum, smoothers) in smoothers.iter().enumerate() {
+                self.smooth(stratum, smoothers);
             }
             let mut change = 0.0_f64;
             for (backup, fresh) in step(self) {
-                let values = &mut self.values[backup.mode * levels + backup.level];
+                let values = &mut self.values[backup.mode * strata + backup.stratum];
                 let pairs = fresh.iter().zip(values.iter());
                 change = pairs.fold(change, |change, (new, old)| change.max((new - old).abs()));
                 *values = fresh;
