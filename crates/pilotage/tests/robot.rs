@@ -120,8 +120,9 @@ fn the_shortest_way_ends() {
         let mut world = ProblemWorld::new(&robot);
         let mut draws = Streams::new(1, 0);
         world.reset(&mut draws);
+        let mut observation = Observation::new(2);
         for action in 0..4 {
-            world.step(action, &mut draws, &mut [0.0; 2]);
+            world.step(action, &mut draws, &mut observation);
         }
     }
 }
