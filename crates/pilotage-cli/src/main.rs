@@ -3,6 +3,7 @@
 mod check;
 mod draw;
 mod failure;
+mod kept;
 mod list;
 mod options;
 mod progress;

@@ -7,11 +7,11 @@ use std::time::Instant;
 use clap::Args;
 use pilotage::model::suggest;
 use pilotage::policy::write_whole;
-use pilotage_report::{Finding, Report, Verdict, page_html, page_markdown, tables_csv};
+use pilotage_report::{Report, Verdict, page_html, page_markdown, tables_csv};
 use pilotage_thesis::{Context, EXPERIMENTS, Experiment, algorithms, episodes};
-use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
+use crate::kept::Maker;
 use crate::progress::Bars;
 
 #[derive(Args)]
@@ -36,15 +36,6 @@ pub struct Arguments {
     list: bool,
 }
 
-/// A finding as it is kept between runs, with what it depends on.
-#[derive(Serialize, Deserialize)]
-struct Kept {
-    version: String,
-    seed: u64,
-    quick: bool,
-    finding: Finding,
-}
-
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.list {
         let mut out = std::io::stdout().lock();
@@ -61,6 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         quick: arguments.quick,
         observer: &bars,
     };
+    let maker = Maker::new(arguments.seed, arguments.quick);
     let data = folder(&arguments.out.join("data"))?;
     let clock = Instant::now();
     let cost = |experiment: &Experiment| {
@@ -73,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (mut findings, mut paid) = (Vec::new(), 0.0);
     for (done, experiment) in chosen.iter().enumerate() {
         let file = data.join(format!("{}.json", experiment.id));
-        let finding = match kept(&file, arguments) {
+        let finding = match maker.find(&file, experiment.id) {
             Some(finding) => finding,
             None => {
                 let left: f64 = chosen[done..].iter().map(|one| cost(one)).sum();
@@ -84,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 );
                 let mut finding = (experiment.make)(&context)?;
                 experiment.id.clone_into(&mut finding.id);
-                keep(&file, arguments, &finding)?;
+                maker.keep(&file, &finding)?;
                 paid += cost(experiment);
                 finding
             }
@@ -162,26 +154,4 @@ fn chosen(only: &[String]) -> Result<Vec<&'static Experiment>, Failure> {
         .iter()
         .filter(|experiment| wanted(experiment.id))
         .collect())
-}
-
-/// What an earlier, interrupted run of the same settings has made already.
-fn kept(file: &Path, arguments: &Arguments) -> Option<Finding> {
-    let text = std::fs::read_to_string(file).ok()?;
-    let kept: Kept = serde_json::from_str(&text).ok()?;
-    let same = kept.version == env!("CARGO_PKG_VERSION")
-        && kept.seed == arguments.seed
-        && kept.quick == arguments.quick;
-    same.then_some(kept.finding)
-}
-
-fn keep(file: &Path, arguments: &Arguments, finding: &Finding) -> Result<(), Failure> {
-    let kept = Kept {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        seed: arguments.seed,
-        quick: arguments.quick,
-        finding: finding.clone(),
-    };
-    let text =
-        serde_json::to_string_pretty(&kept).map_err(|error| Failure::Output(error.into()))?;
-    Ok(write_whole(file, text.as_bytes())?)
 }

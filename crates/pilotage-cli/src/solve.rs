@@ -170,7 +170,8 @@ impl Arguments {
     fn check_files(&self) -> Result<(), Failure> {
         let curves = self.learner.curves.iter();
         let curves = curves.flat_map(|path| CURVES.map(|suffix| beside(path, suffix)));
-        for path in self.out.clone().into_iter().chain(curves) {
+        let others = [&self.out, &self.learner.checkpoint].into_iter().flatten();
+        for path in others.cloned().chain(curves) {
             check_writable(&path)?;
         }
         Ok(())
@@ -247,7 +248,36 @@ impl Told {
             }
             settings.push((setting.clone(), value.clone()));
         }
-        Ok((entry.solver(&settings)?, runs))
+        let solver = entry.solver(&settings);
+        Ok((solver.map_err(|error| self.as_written(error))?, runs))
+    }
+
+    /// What is wrong with a setting, said of the option that gave it where one did.
+    fn as_written(&self, error: pilotage::Error) -> Failure {
+        let (setting, value, wrong) = match &error {
+            pilotage::Error::Setting {
+                setting,
+                value,
+                range,
+            } => (*setting, value, format!("is out of range: {range}")),
+            pilotage::Error::NoValue {
+                setting,
+                value,
+                about,
+            } => (
+                setting.as_str(),
+                value,
+                format!("is no value of it: {about}"),
+            ),
+            _ => return error.into(),
+        };
+        let by_name = self.set.iter().any(|(name, _)| name == setting);
+        let given = self.options().into_iter();
+        let mut given = given.filter(|(_, name, _)| *name == setting && !by_name);
+        match given.next() {
+            Some((option, ..)) => Failure::Usage(format!("{option} {value} {wrong}")),
+            None => error.into(),
+        }
     }
 }
 
@@ -314,9 +344,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let clock = Instant::now();
     let solution = solve(solver, &scenario, &request, &bars)?;
     let solve_seconds = clock.elapsed().as_secs_f64();
-    if let (Some(path), Some(automaton)) = (&arguments.out, solution.automaton()) {
-        automaton.save(path)?;
-    }
+    // What was found is shown all the same where it cannot be kept: it may have taken hours.
+    let kept = match (&arguments.out, solution.automaton()) {
+        (Some(path), Some(automaton)) => automaton.save(path).map(|()| true),
+        _ => Ok(false),
+    };
     let curves = arguments.learner.draw(&solution)?;
     let clock = Instant::now();
     let mut earned = solution.earned(&scenario, arguments.evaluation.options(), &bars)?;
@@ -347,11 +379,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         writeln!(out, "{report}")?;
     } else {
-        write!(
-            out,
-            "{}",
-            shown(arguments, &scenario, solver, &solution, &earned, seconds)
-        )?;
+        let kept = kept.as_ref().is_ok_and(|kept| *kept);
+        let shown = shown(
+            arguments, &scenario, solver, &solution, &earned, kept, seconds,
+        );
+        write!(out, "{shown}")?;
         if let Some(bound) = &bound {
             writeln!(
                 out,
@@ -370,6 +402,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             writeln!(out, "  {}", shown_path(&file))?;
         }
     }
+    kept?;
     Ok(())
 }
 
@@ -427,6 +460,7 @@ fn shown(
     solver: &Solver,
     solution: &Solution,
     earned: &Earned,
+    kept: bool,
     (solve, evaluate): (f64, f64),
 ) -> String {
     let nodes = solution.automaton().map(|automaton| automaton.nodes.len());
@@ -460,7 +494,7 @@ fn shown(
         "  {solve:.2} s to solve, {evaluate:.2} s to evaluate, seed {}",
         arguments.evaluation.seed
     ));
-    if let (Some(path), Some(_)) = (&arguments.out, solution.automaton()) {
+    if let (Some(path), true) = (&arguments.out, kept) {
         // A policy names its problem, which is enough to find a built-in one.
         let problem = match arguments.problem.to_str().and_then(scenario::builtin) {
             Some(_) => String::new(),

@@ -277,7 +277,7 @@ fn what_cannot_be_done_is_one_message() {
                 "--with",
                 "policy-search",
             ],
-            "effort=",
+            "--effort NaN is no value of it",
         ),
         (
             &[

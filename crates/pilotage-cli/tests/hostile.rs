@@ -50,6 +50,22 @@ fn solve_to(folder: &Path, out: &str) -> Output {
     pilotage(folder, &arguments).output().unwrap()
 }
 
+/// Changes the policy in a file, and gives it the checksum of what it has become: FNV-1a over the policy without white space between its
+/// values.
+fn edit(file: &Path, edit: impl FnOnce(&mut serde_json::Value)) {
+    let mut whole: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
+    edit(&mut whole["policy"]);
+    let policy = whole["policy"].to_string();
+    let checksum = policy
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+    whole["checksum"] = format!("fnv1a64-{checksum:016x}").into();
+    fs::write(file, whole.to_string()).unwrap();
+}
+
 fn is_policy(text: &str) -> bool {
     text.contains("\"policy\"")
 }
@@ -197,7 +213,6 @@ fn a_wrong_name_for_the_output_is_known_before_the_work_is_done() {
     assert!(clock.elapsed() < Duration::from_secs(10));
 }
 
-/// A learner writes its checkpoint all the time; whenever it is ended, by whatever signal, nothing else is left behind.
 /// The program, told to hear signals that whoever started the tests may ignore, as `nohup` does.
 fn hearing_signals(folder: &Path, arguments: &[&str]) -> Command {
     if !cfg!(target_os = "linux") {
@@ -212,6 +227,7 @@ fn hearing_signals(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
+/// A learner writes its checkpoint all the time; whenever it is ended, by whatever signal, nothing else is left behind.
 #[test]
 fn signals_leave_no_temporary_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -290,29 +306,57 @@ fn refused(folder: &Path, arguments: &[&str], says: &str) {
 const MAX: &str = "18446744073709551615";
 
 #[test]
+fn no_verb_starts_a_hundred_thousand_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    for verb in ["solve tiger", "simulate tiger --policy p.json", "reproduce"] {
+        for threads in ["100000", MAX] {
+            let line = format!("{verb} --threads {threads}");
+            let arguments: Vec<&str> = line.split(' ').collect();
+            refused(folder.path(), &arguments, "at most 1024");
+        }
+    }
+}
+
+#[test]
 fn extreme_settings_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let rows: &[(&[&str], &str)] = &[
-        (&["--threads", "100000"], "at most 1024"),
-        (&["--threads", MAX], "at most 1024"),
         (
             &["--with", "policy-search", "--effort", "nan"],
-            "out of range",
-        ),
-        (
-            &["--with", "policy-search", "--effort", "0"],
-            "above 0, at most 1000",
+            "error: --effort NaN is no value of it: Factor on the length of all simulations; more than 0, at most 1000, and 1 is the \
+             thorough search.\n",
         ),
         (
             &["--with", "policy-search", "--effort", "inf"],
-            "out of range",
+            "error: --effort inf is no value of it: Factor on the length of all simulations; more than 0, at most 1000",
+        ),
+        (
+            &["--with", "policy-search", "--set", "effort=nan"],
+            "error: effort = nan is no value of it: Factor on the length of all simulations; more than 0, at most 1000",
+        ),
+        (
+            &["--with", "policy-search", "--set", "objective=luck"],
+            "error: objective = luck is no value of it: What is sought: `return`, or `survival`",
+        ),
+        (
+            &["--with", "policy-search", "--effort", "0"],
+            "error: --effort 0 is out of range: above 0, at most 1000\n",
         ),
         (
             &["--with", "policy-search", "--effort", "1e300"],
-            "above 0, at most 1000",
+            "is out of range: above 0, at most 1000\n",
         ),
-        (&["--grid", "0"], "points = 0 is out of range"),
-        (&["--grid", "1"], "points = 1 is out of range"),
+        (
+            &["--with", "policy-search", "--set", "effort=0"],
+            "error: effort = 0 is out of range: above 0, at most 1000\n",
+        ),
+        (
+            &["--with", "lqg", "--state-weights", "nan"],
+            "error: --state-weights [NaN] is no value of it: ",
+        ),
+        (&["--grid", "0"], "--grid 0 is out of range"),
+        (&["--grid", "1"], "--grid 1 is out of range"),
+        (&["--set", "points=0"], "points = 0 is out of range"),
         (
             &["--runs", MAX],
             "runs = 18446744073709551615 is out of range",
@@ -330,11 +374,11 @@ fn extreme_settings_are_refused_by_name() {
                 "--last-horizon",
                 MAX,
             ],
-            "first_horizon = 18446744073709551615 is out of range",
+            "first-horizon 18446744073709551615 is out of range",
         ),
         (
             &["--with", "kbvi", "--last-horizon", MAX],
-            "last_horizon = 18446744073709551615 is out of range",
+            "last-horizon 18446744073709551615 is out of range",
         ),
         (&["--grid", "100000000"], "more than the 1024 MiB allowed"),
         (&["--grid", MAX, "--memory", MAX], "MiB are free here"),
@@ -344,7 +388,7 @@ fn extreme_settings_are_refused_by_name() {
         ),
         (
             &["--with", "qmdp", "--grid", "0"],
-            "points = 0 is out of range",
+            "--grid 0 is out of range",
         ),
     ];
     for (settings, says) in rows {
@@ -353,6 +397,104 @@ fn extreme_settings_are_refused_by_name() {
             &[&["solve", "corridor"], *settings].concat(),
             says,
         );
+    }
+}
+
+/// What is kept of a grid may have room where what a sweep looks up at its points has none.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_is_counted_before_it_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = fs::read_to_string("/proc/meminfo").unwrap();
+    let free = table.lines().find_map(|line| {
+        let number = line.strip_prefix("MemAvailable:")?;
+        number.split_whitespace().next()?.parse::<u64>().ok()
+    });
+    // Less than a third of what is free for the functions, and more than all of it with three look-ups of 200 bytes a point.
+    let points = free.unwrap() * 1024 / 550;
+    let limited = format!(
+        "ulimit -v 4000000; '{}' solve corridor --grid {points} --memory {MAX}",
+        env!("CARGO_BIN_EXE_pilotage")
+    );
+    let output = shell(folder.path(), &limited);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("MiB are free here"), "{said}");
+}
+
+#[test]
+fn counts_of_a_learner_that_no_run_comes_to_the_end_of_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let common = ["calm", "epoch", "epoch_limit", "trial"];
+    let own: [(&str, &[&str]); 2] = [
+        (
+            "kafaq",
+            &["cell_limit", "cells_along", "epoch_per_cell", "window"],
+        ),
+        (
+            "arkaq",
+            &[
+                "scout",
+                "settle",
+                "explore_limit",
+                "state_limit",
+                "epoch_per_entry",
+                "depth",
+            ],
+        ),
+    ];
+    for (learner, own) in own {
+        for key in common.iter().chain(own) {
+            let setting = format!("{key}={MAX}");
+            let arguments = ["solve", "basic", "--with", learner, "--learn", &setting];
+            let says = format!("{key} = {MAX} is out of range");
+            refused(folder.path(), &arguments, &says);
+        }
+    }
+}
+
+#[test]
+fn a_checkpoint_is_a_file_that_can_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    assert!(system(here, &["mkfifo", "pipe"]));
+    for (learner, checkpoint, says) in [
+        ("kafaq", "/dev/null", "this is no file"),
+        ("arkaq", "/dev/zero", "this is no file"),
+        ("arkaq", "pipe", "this is no file"),
+        ("kafaq", ".", "this is a directory"),
+        ("arkaq", "missing/run.json", "missing/run.json"),
+    ] {
+        let arguments = [
+            "solve",
+            "stations-5x5",
+            "--with",
+            learner,
+            "--learn",
+            "epoch=100000000",
+            "--checkpoint",
+            checkpoint,
+        ];
+        refused(here, &arguments, says);
+    }
+}
+
+/// A disk that is full, or a policy too large for a file, is met only when the work is done; what it came to is told all the same.
+#[test]
+fn a_policy_that_cannot_be_kept_is_not_lost_without_a_word() {
+    let folder = tempfile::tempdir().unwrap();
+    for (json, shows) in [
+        (None, "discounted return"),
+        (Some("--json"), "\"evaluation\""),
+    ] {
+        let arguments = [&SOLVE[..], &["--out", "/dev/full"]].concat();
+        let mut command = pilotage(folder.path(), &arguments);
+        let output = command.args(json).output().unwrap();
+        let (printed, said) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.starts_with("error: /dev/full: "), "{said}");
+        assert!(printed.contains(shows), "{printed}");
+        assert!(!printed.contains("kept in"), "{printed}");
     }
 }
 
@@ -372,6 +514,9 @@ fn streams_that_are_full_or_closed_end_in_an_exit_code() {
         ("pilotage check nowhere 2> >(true)", false),
         ("pilotage solve corridor --seed x 2> /dev/full", false),
         ("pilotage check nowhere > /dev/full 2>&1", false),
+        ("pilotage reproduce --list > /dev/full", false),
+        ("pilotage solve tiger --episodes 10 2> /dev/full", true),
+        ("pilotage solve tiger --episodes 10 2>&-", true),
         ("pilotage check corridor 2> /dev/full", true),
         ("pilotage check corridor 2>&-", true),
         ("pilotage check corridor <&- 2>&-", true),
@@ -515,16 +660,161 @@ fn a_hundred_thousand_levels_are_checked_and_planned_for() {
 #[test]
 fn a_policy_does_not_choose_the_files_that_are_read() {
     let folder = tempfile::tempdir().unwrap();
-    assert!(solve_to(folder.path(), "p.json").status.success());
-    let policy = fs::read_to_string(folder.path().join("p.json")).unwrap();
-    fs::write(folder.path().join("secret"), "password = 'abc'").unwrap();
-    let named = policy.replacen("\"tiger\"", "\"secret\"", 1);
-    fs::write(folder.path().join("p.json"), named).unwrap();
-    let output = pilotage(folder.path(), &["draw", "p.json"])
-        .output()
-        .unwrap();
-    assert!(!output.status.success());
-    assert!(!text(&output.stderr).contains("password"));
+    let here = folder.path();
+    fs::write(here.join("secret"), "password = 'abc'").unwrap();
+    fs::write(here.join("corridor.toml"), built_in("corridor")).unwrap();
+    assert!(solve_to(here, "p.json").status.success());
+    for named in ["secret", "./secret", "corridor.toml"] {
+        edit(&here.join("p.json"), |policy| {
+            policy["problem"] = named.into()
+        });
+        let output = pilotage(here, &["draw", "p.json"]).output().unwrap();
+        let said = text(&output.stderr);
+        assert!(!said.contains("password"), "{said}");
+        refused(here, &["draw", "p.json"], "which is not built in");
+    }
+}
+
+/// Numbers and names of a policy file, edited by hand by somebody who corrects its checksum.
+#[test]
+fn a_policy_whose_numbers_lead_nowhere_is_refused_or_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let file = here.join("p.json");
+    let solve = "solve corridor --episodes 10 --grid 101 --out p.json";
+    let solve: Vec<&str> = solve.split(' ').collect();
+    assert!(pilotage(here, &solve).output().unwrap().status.success());
+    let whole = fs::read_to_string(&file).unwrap();
+    let simulate = [
+        "simulate",
+        "corridor",
+        "--policy",
+        "p.json",
+        "--episodes",
+        "10",
+    ];
+    edit(&file, |_| {});
+    let unchanged = pilotage(here, &simulate).output().unwrap();
+    assert!(unchanged.status.success(), "{}", text(&unchanged.stderr));
+
+    let huge = "no number may be larger than";
+    for (pointer, value, says) in [
+        ("/filter/A/0/0", serde_json::json!(1e200), huge),
+        ("/filter/Bu/0/0", serde_json::json!(-1e200), huge),
+        ("/filter/H/0/0", serde_json::json!(1e308), huge),
+        (
+            "/filter/levels/0/steps/0/gain/0/0",
+            serde_json::json!(1e200),
+            huge,
+        ),
+        ("/start/mean/0", serde_json::json!(1e200), huge),
+        ("/nodes/0/value", serde_json::json!(-1e308), huge),
+        (
+            "/filter/levels/0/covariance/0/0",
+            serde_json::json!(-1),
+            "not positive semi-definite",
+        ),
+        (
+            "/filter/levels/0/steps/0/next",
+            serde_json::json!(u64::MAX),
+            "levels, counted from 0",
+        ),
+        ("/scale/0", serde_json::json!(1e-320), "where at least"),
+        ("/scale/0", serde_json::json!(0), "where at least"),
+        ("/nodes", serde_json::json!([]), "the list is empty"),
+        (
+            "/solver",
+            serde_json::json!("\u{1b}]0;owned\u{7}"),
+            "\\u{1b}",
+        ),
+        ("/problem", serde_json::json!("corridor\u{7}"), "\\u{7}"),
+        ("/actions/0", serde_json::json!("EAST\u{202e}"), "\\u{202e}"),
+        ("/states/0", serde_json::json!("x\u{9b}2J"), "\\u{9b}"),
+    ] {
+        fs::write(&file, &whole).unwrap();
+        edit(&file, |policy| {
+            *policy.pointer_mut(pointer).unwrap() = value;
+        });
+        refused(here, &simulate, says);
+        refused(here, &["draw", "p.json"], says);
+    }
+    // Each number is allowed, and together they grow from step to step.
+    fs::write(&file, &whole).unwrap();
+    edit(&file, |policy| {
+        *policy.pointer_mut("/filter/A/0/0").unwrap() = serde_json::json!(1e20);
+    });
+    refused(here, &simulate, "the mean of the belief is");
+}
+
+/// Whatever a file or its name holds, nothing of it reaches the terminal that the terminal would obey.
+#[test]
+fn nothing_that_a_terminal_obeys_is_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let (escape, wrong) = ("\u{1b}]0;owned\u{7}", "a\u{1b}[2J.toml");
+    let (policy, setting) = ("p\u{1b}[2J.json", "a\u{1b}=1");
+    let corridor = built_in("corridor");
+    fs::write(here.join(wrong), &corridor).unwrap();
+    for (file, old, new) in [
+        ("raw.toml", "EAST", escape),
+        ("escaped.toml", "EAST", "\\u001b]0;owned\\u0007"),
+        ("c1.toml", "discount", "# \u{9b}2J\ndiscont"),
+        ("key.toml", "discount", "\"\\u001b[2J\" = 1\ndiscount"),
+    ] {
+        assert!(corridor.contains(old));
+        fs::write(here.join(file), corridor.replacen(old, new, 1)).unwrap();
+    }
+    let header = format!("{{\"format\": \"{escape}\"}}");
+    fs::write(here.join("policy.json"), header).unwrap();
+    let newer = "{\"format\": 99, \"pilotage\": \"\\u001b[2J\"}";
+    fs::write(here.join("newer.json"), newer).unwrap();
+    fs::write(here.join("run.json"), format!("{newer}\n{{}}\n")).unwrap();
+    let commands: &[&[&str]] = &[
+        &["check", wrong],
+        &["check", "raw.toml"],
+        &["check", "escaped.toml"],
+        &["check", "c1.toml"],
+        &["check", "key.toml"],
+        &["check", escape],
+        &["solve", wrong, "--episodes", "10", "--out", policy],
+        &["simulate", wrong, "--policy", policy, "--episodes", "10"],
+        &["draw", policy, "--problem", wrong],
+        &["draw", "policy.json"],
+        &["draw", "newer.json"],
+        &["draw", escape],
+        &["solve", "corridor", "--with", escape],
+        &["solve", "corridor", "--policy", escape],
+        &["solve", "corridor", "--seed", escape],
+        &["solve", "corridor", "--set", setting],
+        &["solve", "corridor", "--set", escape],
+        &["solve", "corridor", "--with", "kafaq", "--learn", setting],
+        &["solve", "corridor", escape],
+        &["reproduce", "--only", escape],
+        &["solve", "basic", "--with", "kafaq", "--checkpoint", policy],
+        &[
+            "solve",
+            "basic",
+            "--with",
+            "kafaq",
+            "--checkpoint",
+            "run.json",
+        ],
+        &[
+            "solve",
+            "basic",
+            "--with",
+            "kafaq",
+            "--checkpoint",
+            "n\u{1b}/x",
+        ],
+    ];
+    for arguments in commands {
+        let output = pilotage(here, arguments).output().unwrap();
+        let printed = text(&output.stdout) + &text(&output.stderr);
+        assert!(!printed.is_empty(), "{arguments:?}");
+        let obeyed = |c: char| c.is_control() && c != '\n' && c != '\t';
+        assert!(!printed.contains(obeyed), "{arguments:?}: {printed:?}");
+    }
 }
 
 /// However many episodes are asked for, few are kept.

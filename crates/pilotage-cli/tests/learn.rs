@@ -212,9 +212,9 @@ fn wrong_settings_are_refused_by_name() {
         ("rate_power=0.1", "rate_power = 0.1 is out of range"),
         ("split_error=0.7", "split_error = 0.7 is out of range"),
         ("cell_limit=0", "cell_limit = 0 is out of range: at least 1"),
-        ("epoch_limit=-3", "epoch_limit=-3"),
-        ("hot=warm", "hot=warm"),
-        ("rules=strict", "rules=strict"),
+        ("epoch_limit=-3", "epoch_limit = -3 is no value of it: "),
+        ("hot=warm", "hot = warm is no value of it: "),
+        ("rules=strict", "rules = strict is no value of it: "),
         ("lambda", "`lambda` is not KEY=VALUE"),
         ("seed=3", "--seed"),
     ];

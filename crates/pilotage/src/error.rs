@@ -87,6 +87,16 @@ pub enum Error {
         /// What is allowed.
         range: &'static str,
     },
+    /// A setting of a solver was given what is no value of it: no finite number, or none of its words.
+    #[error("{setting} = {value} is no value of it: {about}")]
+    NoValue {
+        /// Name of the setting.
+        setting: String,
+        /// What was given.
+        value: String,
+        /// What the setting means, and its range.
+        about: String,
+    },
     /// Numbers shown to a network that it cannot take.
     #[error("{place} = {value} is refused: {reason}")]
     Input {

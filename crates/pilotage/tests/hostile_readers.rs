@@ -1,5 +1,5 @@
 //! Readers of models, policies and checkpoints under fire. The budget is a few thousand inputs each; `FUZZ_INPUTS` sets another, and
-//! `cargo run --release --example fuzz_readers` says how a million went.
+//! `cargo run --release -p pilotage --example fuzz_readers` says how a million went.
 #![allow(clippy::unwrap_used)]
 
 mod fuzzing;

@@ -136,6 +136,20 @@ fn what_is_deep_or_long_is_refused_at_once() {
     assert!(error.contains("32 MiB"), "{error}");
 }
 
+#[test]
+fn what_is_too_long_to_be_read_again_is_not_written() {
+    let mut automaton = one_node();
+    automaton.nodes[0].predecessors = vec![(0, 0.012_345_678_901_234_567); 1_500_000];
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("policy.json");
+    std::fs::write(&path, "old").unwrap();
+    let error = automaton.save(&path).unwrap_err().to_string();
+    for part in ["32 MiB that are read again", "`level_tolerance`"] {
+        assert!(error.contains(part), "{error}");
+    }
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+}
+
 /// An automaton with everything that a file can have.
 fn rich() -> Automaton {
     let mut automaton = empty("load-unload", Matching::Segments);

@@ -106,3 +106,23 @@ fn a_policy_is_refused_a_world_that_it_has_no_actions_or_sensors_for() {
     blind.sensor.h = nalgebra::DMatrix::from_row_slice(2, 1, &[1.0, 1.0]);
     assert!(refused(&blind).contains("2 readings"));
 }
+
+/// A way of next to nothing, in ticks so long that the speed for it is no number above 0, comes to its end.
+#[test]
+fn the_shortest_way_ends() {
+    let mut robot = robot_of("maze-4x4");
+    let Simulator::Robot(arena) = &mut robot.truth.simulator else {
+        panic!("no robot");
+    };
+    arena.tick = 9e15;
+    for shortest in [1e-300, 1e-308] {
+        robot.model.motion.b[(1, 1)] = -shortest;
+        let mut world = ProblemWorld::new(&robot);
+        let mut draws = Streams::new(1, 0);
+        world.reset(&mut draws);
+        let mut observation = Observation::new(2);
+        for action in 0..4 {
+            world.step(action, &mut draws, &mut observation);
+        }
+    }
+}

@@ -45,25 +45,18 @@ pub trait Settings: Clone + Default + Serialize + DeserializeOwned + JsonSchema 
     /// the default. Ranges are left to [`Settings::validate`].
     ///
     /// # Errors
-    /// [`Error::Unknown`] for a name that is none, with those there are; [`Error::Setting`] for a value of another kind than the
-    /// setting's.
+    /// [`Error::Unknown`] for a name that is none, with those there are; [`Error::NoValue`] for a value of another kind than the
+    /// setting's, which `nan` and `inf` are too.
     fn set(&mut self, name: &str, value: &str) -> Result<()> {
-        let wrong = |value: String| Error::Setting {
-            setting: "a setting of the solver",
-            value,
-            range: "a value of the kind that it has by default",
-        };
-        let mut all = serde_json::to_value(&*self).map_err(|error| wrong(error.to_string()))?;
+        let mut all = serde_json::to_value(&*self).unwrap_or_default();
         let Some(slot) = all.get_mut(name).filter(|_| name != SEED) else {
             return Err(unknown::<Self>(name));
         };
-        let default = shown(slot);
         *slot = match value {
             AUTO => Value::Null,
             _ => serde_json::from_str(value).unwrap_or_else(|_| value.into()),
         };
-        *self = serde_json::from_value(all)
-            .map_err(|_| wrong(format!("{name}={value} (it is {default})")))?;
+        *self = serde_json::from_value(all).map_err(|_| no_value::<Self>(name, value))?;
         Ok(())
     }
 }
@@ -99,6 +92,16 @@ fn unknown<S: Settings>(name: &str) -> Error {
             "{meant}there are `{}`",
             known().collect::<Vec<_>>().join("`, `")
         ),
+    }
+}
+
+fn no_value<S: Settings>(name: &str, value: &str) -> Error {
+    let mut described = S::described().into_iter();
+    let about = described.find(|setting| setting.name == name);
+    Error::NoValue {
+        setting: name.to_owned(),
+        value: value.to_owned(),
+        about: about.map_or_else(String::new, |setting| setting.about),
     }
 }
 

@@ -137,7 +137,8 @@ impl RobotArena {
             axle, speed, tick, ..
         } = self.robot;
         let mut left = distance.abs();
-        while left > 0.0 {
+        // What is left may be so little that a speed for it is no number above 0.
+        while left / tick > 0.0 {
             let steer = 0.5 * axle * GAIN * self.deviation(heading, rng);
             // Steering takes its share of the top speed.
             let steer = steer.clamp(-0.5 * speed, 0.5 * speed);

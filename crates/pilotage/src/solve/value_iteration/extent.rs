@@ -231,6 +231,24 @@ pub(super) fn mebibytes(mdp: &BeliefMdp, points: u64) -> u64 {
     each.saturating_mul(functions(mdp)) >> 20
 }
 
+/// Bytes of what one action looks up at a point, about.
+pub(super) const LOOK_UP: usize = 200;
+
+/// Whether there is room for the functions on a grid of so many points, and for what a sweep over so many levels looks up there.
+///
+/// # Errors
+/// [`Error::OutOfMemory`] where more is needed than is free.
+pub(super) fn sweep_fits(mdp: &BeliefMdp, points: usize, levels: usize) -> Result<()> {
+    let (model, points) = (mdp.model(), points as u64);
+    let looked_up = [levels, model.modes.len(), model.actions.len(), LOOK_UP];
+    let bytes = looked_up
+        .iter()
+        .fold(points, |bytes, &count| bytes.saturating_mul(count as u64));
+    let needed = mebibytes(mdp, points).saturating_add(bytes >> 20);
+    let all = points.saturating_mul(functions(mdp));
+    memory::check(&model.name, all, needed, u64::MAX)
+}
+
 /// Four points a cell, so that the sides of cells are among them, and at least 41.
 fn points_of_map(model: &Model) -> usize {
     let cells = model.map.as_ref().map_or(0, |map| {

@@ -79,9 +79,11 @@ pub(super) fn iterate(
         grid.len(),
         mebibytes(mdp, grid.len() as u64)
     ));
+    let groups = groups_of_levels(mdp);
+    let largest = groups.iter().map(Vec::len).max().unwrap_or(0);
+    super::extent::sweep_fits(mdp, grid.len(), largest)?;
     let mut policy = GridPolicy::new(mdp.clone(), grid);
     policy.end_episodes();
-    let groups = groups_of_levels(mdp);
     observer.progress("levels", 0, groups.len() as u64);
     for (done, group) in groups.iter().enumerate() {
         policy.solve_group(group, settings)?;

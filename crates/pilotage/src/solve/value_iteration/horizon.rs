@@ -83,9 +83,8 @@ impl GridPolicy {
     /// What the plan's own actions earn in an episode of so many steps from the start, and what the best earn; `None` where that takes
     /// more memory than allowed.
     fn over_episode(&mut self, length: usize, settings: &Settings) -> Option<(f64, f64)> {
-        const ENTRY: usize = 200;
         let actions = self.mdp().model().actions.len();
-        let bytes = self.values.len() * self.grid().len() * actions * ENTRY;
+        let bytes = self.values.len() * self.grid().len() * actions * super::extent::LOOK_UP;
         if (bytes >> 20) as u64 > settings.memory {
             return None;
         }
