@@ -26,7 +26,7 @@ pub(super) fn plan(
 ) -> Result<GridPolicy> {
     let (model, length) = (mdp.model(), mdp.model().episode.length);
     if model.discount >= 1.0 {
-        return iterate(&BeliefMdp::with_horizon(model, length), settings, observer);
+        return iterate(&telling_time(mdp)?, settings, observer);
     }
     let mut policy = iterate(mdp, settings, observer)?;
     let scale = policy.start_value.abs().max(f64::MIN_POSITIVE);
@@ -51,18 +51,28 @@ pub(super) fn plan(
         policy.promised = Some(own);
         return Ok(policy);
     }
-    match iterate(&BeliefMdp::with_horizon(model, length), settings, observer) {
-        Err(Error::TooLarge { mebibytes, .. } | Error::OutOfMemory { mebibytes, .. }) => {
-            policy.remarks.push(format!(
-                "horizon: acts as if an episode of {length} steps had no end, which earns {own:.4} where {best:.4} can be had; \
-                 telling the time takes {mebibytes} MiB, more than the {} MiB allowed (memory)",
-                settings.memory
-            ));
-            policy.promised = Some(own);
-            Ok(policy)
+    let why = match telling_time(mdp).and_then(|told| iterate(&told, settings, observer)) {
+        Err(Error::TooManyLevels { levels, .. }) => {
+            format!("levels that tell the time are more than the {levels} there is room for")
         }
-        told => told,
-    }
+        Err(Error::TooLarge { mebibytes, .. } | Error::OutOfMemory { mebibytes, .. }) => format!(
+            "telling the time takes {mebibytes} MiB, more than the {} MiB allowed (memory)",
+            settings.memory
+        ),
+        told => return told,
+    };
+    policy.remarks.push(format!(
+        "horizon: acts as if an episode of {length} steps had no end, which earns {own:.4} where {best:.4} can be had; {why}"
+    ));
+    policy.promised = Some(own);
+    Ok(policy)
+}
+
+/// The decision process whose levels tell the time up to the end of an episode.
+fn telling_time(mdp: &BeliefMdp) -> Result<BeliefMdp> {
+    let told = BeliefMdp::with_horizon(mdp.model(), mdp.model().episode.length);
+    told.check()?;
+    Ok(told)
 }
 
 impl GridPolicy {
