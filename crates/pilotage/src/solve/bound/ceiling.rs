@@ -1,8 +1,8 @@
 //! The bound that always holds: the most that any state pays, at every step.
 
 use super::frame::{cuts, inside};
-use super::step::{after, before};
-use crate::model::{ActionId, ModeId, Model, Then};
+use super::step::Doing;
+use crate::model::{ActionId, Effect, ModeId, Model, Then};
 
 /// Most cells of states that are looked at one by one.
 const MOST_CELLS: usize = 10_000;
@@ -39,9 +39,10 @@ impl Ceiling {
 
     /// Every place to begin in with every place to end in.
     fn look(&mut self, model: &Model, mode: ModeId, action: ActionId, places: &[Vec<f64>]) {
+        let doing = Doing::new(model, mode, action);
         let mut known: Vec<(ModeId, bool, [f64; 2])> = Vec::new();
         for at in places {
-            let before = before(model, mode, action, at);
+            let before = doing.before(at);
             if before.then != Then::Continue {
                 self.take(before.then, before.reward);
                 continue;
@@ -54,7 +55,7 @@ impl Ceiling {
                 None => {
                     let mut most = [f64::NEG_INFINITY; 2];
                     for to in places {
-                        let after = after(model, mode, action, &before, to);
+                        let after = doing.after(&before, to);
                         let kind = usize::from(after.then == Then::End);
                         most[kind] = most[kind].max(after.reward);
                     }
@@ -69,12 +70,14 @@ impl Ceiling {
 
     /// With too many places to look at: all rewards above 0 together, and the best event.
     fn add_up(&mut self, model: &Model, mode: ModeId, action: ActionId) {
-        let rewards = model.rewards.iter();
-        let rewards = rewards.filter(|reward| reward.applies(mode, action));
-        let paid: f64 = rewards.map(|reward| reward.value.max(0.0)).sum();
-        let events = model.events.iter();
-        let events = events.filter(|event| event.applies(mode, action));
-        let event = events.map(|event| event.reward).fold(0.0, f64::max);
+        let effects = model.effects(mode, action, 0).into_iter();
+        let (events, rewards): (Vec<Effect>, Vec<Effect>) =
+            effects.partition(|effect| effect.change.is_some());
+        let paid: f64 = rewards.iter().map(|effect| effect.reward.max(0.0)).sum();
+        let event = events
+            .iter()
+            .map(|effect| effect.reward)
+            .fold(0.0, f64::max);
         let most = paid + event + model.episode.failure_reward.max(0.0);
         self.take(Then::End, most);
         if model.actions[action].then != Then::End {

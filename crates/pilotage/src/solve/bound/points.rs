@@ -7,7 +7,7 @@
 
 use nalgebra::DVector;
 
-use super::step::{After, after, before};
+use super::step::{After, Doing};
 use crate::belief::gaussian::normal_cdf;
 use crate::belief::kalman::square_root;
 use crate::model::{ActionId, ModeId, Model, Then};
@@ -58,15 +58,16 @@ pub(super) fn bound(model: &Model) -> Result<f64, String> {
 
 fn effects(model: &Model, places: [&DVector<f64>; 2]) -> Result<Vec<Vec<Effect>>, String> {
     let effect = |mode: ModeId, action: ActionId| {
+        let doing = Doing::new(model, mode, action);
         let [one, other] = places.map(|at| {
-            let before = before(model, mode, action, at.as_slice());
+            let before = doing.before(at.as_slice());
             let end = After {
                 reward: 0.0,
                 mode: before.mode,
                 then: before.then,
             };
             let after = match before.then {
-                Then::Continue => after(model, mode, action, &before, at.as_slice()),
+                Then::Continue => doing.after(&before, at.as_slice()),
                 _ => end,
             };
             (before.reward + after.reward, after.mode, after.then)

@@ -1,7 +1,6 @@
-//! What a step pays and does at a true state, as the world does it ([`crate::world::ProblemWorld`]), for the seen and for the
-//! believed.
+//! What an action pays and does at a true state, by the model's [effects](crate::model::Effect), for the seen and for the believed.
 
-use crate::model::{ActionId, Event, ModeId, Model, Then, When};
+use crate::model::{ActionId, Effect, ModeId, Model, Tally, Then, When};
 
 /// What happens before the state moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,73 +26,56 @@ pub(super) struct After {
     pub then: Then,
 }
 
-/// An action taken in a mode at a state.
-pub(super) fn before(model: &Model, mode: ModeId, action: ActionId, at: &[f64]) -> Before {
-    let event = first_event(model, When::Before, mode, action, at);
-    let then = match (model.actions[action].then, event) {
-        (Then::Continue, Some(event)) => event.then,
-        (then, _) => then,
-    };
-    Before {
-        reward: paid(model, When::Before, mode, action, at) + reward_of(event),
-        mode: event.and_then(|event| event.becomes).unwrap_or(mode),
-        then,
-        happened: event.is_some(),
-    }
-}
-
-/// Where the state has moved to after an action that was taken in a mode, and what happened before it moved.
-pub(super) fn after(
-    model: &Model,
-    mode: ModeId,
-    action: ActionId,
-    before: &Before,
-    at: &[f64],
-) -> After {
-    if !model.episode.alive.contains(at) {
-        return After {
-            reward: model.episode.failure_reward,
-            mode: before.mode,
-            then: Then::End,
-        };
-    }
-    let event = match before.happened {
-        true => None,
-        false => first_event(model, When::After, mode, action, at),
-    };
-    After {
-        reward: paid(model, When::After, mode, action, at) + reward_of(event),
-        mode: event.and_then(|event| event.becomes).unwrap_or(before.mode),
-        then: event.map_or(Then::Continue, |event| event.then),
-    }
-}
-
-fn paid(model: &Model, when: When, mode: ModeId, action: ActionId, at: &[f64]) -> f64 {
-    let rewards = model.rewards.iter().filter(|reward| {
-        reward.when == when && reward.applies(mode, action) && reward.region.contains(at)
-    });
-    rewards.map(|reward| reward.value).sum()
-}
-
-fn first_event<'a>(
+/// An action taken in a mode, in a model that no step of the episode changes.
+pub(super) struct Doing<'a> {
     model: &'a Model,
-    when: When,
-    mode: ModeId,
-    action: ActionId,
-    at: &[f64],
-) -> Option<&'a Event> {
-    model.events.iter().find(|event| {
-        event.when == when && event.applies(mode, action) && event.region.contains(at)
-    })
+    tally: Tally,
+    before: Vec<Effect>,
+    after: Vec<Effect>,
 }
 
-fn reward_of(event: Option<&Event>) -> f64 {
-    event.map_or(0.0, |event| event.reward)
-}
+impl<'a> Doing<'a> {
+    pub fn new(model: &'a Model, mode: ModeId, action: ActionId) -> Self {
+        let effects = model.effects(mode, action, 0).into_iter();
+        let (before, after) = effects.partition(|effect| effect.when == When::Before);
+        Self {
+            model,
+            tally: model.tally(mode, action),
+            before,
+            after,
+        }
+    }
 
-/// Whether anything starts the episode afresh.
-pub(super) fn restarts(model: &Model) -> bool {
-    let actions = model.actions.iter().map(|action| action.then);
-    let mut all = actions.chain(model.events.iter().map(|event| event.then));
-    all.any(|then| then == Then::Restart)
+    /// The action at a state.
+    pub fn before(&self, at: &[f64]) -> Before {
+        let mut tally = self.tally;
+        let happened = tally.see(&self.before, at);
+        let outcome = happened.unwrap_or_else(|| tally.rest());
+        Before {
+            reward: tally.reward,
+            mode: outcome.mode,
+            then: outcome.then,
+            happened: happened.is_some(),
+        }
+    }
+
+    /// Where the state has moved to, and what happened before it moved.
+    pub fn after(&self, before: &Before, at: &[f64]) -> After {
+        if !self.model.episode.alive.contains(at) {
+            return After {
+                reward: self.model.episode.failure_reward,
+                mode: before.mode,
+                then: Then::End,
+            };
+        }
+        let mut tally = self.tally;
+        let over = |effect: &&Effect| before.happened && effect.change.is_some();
+        let left = self.after.iter().filter(|effect| !over(effect));
+        let happened = tally.see(left, at);
+        After {
+            reward: tally.reward,
+            mode: happened.map_or(before.mode, |outcome| outcome.mode),
+            then: happened.map_or(Then::Continue, |outcome| outcome.then),
+        }
+    }
 }

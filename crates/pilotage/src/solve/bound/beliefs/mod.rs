@@ -28,7 +28,6 @@ use super::frame::{AxisModel, Frame};
 use super::law::Law;
 use super::levels::{Levels, Variances};
 use super::measure::common_measure;
-use super::step::restarts;
 use crate::model::{ActionId, ModeId, Then};
 use crate::progress::Progress;
 use crate::solve::grid::Axis;
@@ -124,7 +123,7 @@ struct Work {
 
 impl<'a> Planner<'a> {
     fn new(frame: &'a Frame<'a>, effects: Vec<Vec<Effect>>, levels: Levels) -> Self {
-        let (reached, late) = reach(&levels, restarts(frame.model));
+        let (reached, late) = reach(&levels, frame.model.restarts());
         Self {
             ceiling: Ceiling::new(frame.model),
             lattice: [NO_AXIS; 2],

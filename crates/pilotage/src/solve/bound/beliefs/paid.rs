@@ -1,7 +1,7 @@
 //! What is paid to a belief, exactly.
 
 use super::super::frame::{Frame, inside};
-use super::super::step::{self, after, before};
+use super::super::step::{self, Doing};
 use crate::model::{ActionId, ModeId, Then};
 
 /// What is paid, constant in each cell between the cuts of both axes; the second axis runs faster.
@@ -107,19 +107,15 @@ pub(super) fn effects(frame: &Frame) -> Result<Vec<Vec<Effect>>, String> {
 }
 
 fn effect(frame: &Frame, mode: ModeId, action: ActionId) -> Result<Effect, String> {
-    let (model, hidden) = (
-        frame.model,
-        "it depends on the state whether an event happens",
-    );
+    let hidden = "it depends on the state whether an event happens";
     let places = [inside(&frame.axes[0].cuts), inside(&frame.axes[1].cuts)];
     let columns = places[1].len();
     let all = || {
         let rows = places[0].iter();
         rows.flat_map(|&x| places[1].iter().map(move |&y| [x, y]))
     };
-    let befores: Vec<step::Before> = all()
-        .map(|at| before(model, mode, action, frame.state(&at)))
-        .collect();
+    let doing = Doing::new(frame.model, mode, action);
+    let befores: Vec<step::Before> = all().map(|at| doing.before(frame.state(&at))).collect();
     let paid = |values: Vec<f64>| Paid { values, columns };
     let first = befores[0];
     if befores
@@ -139,7 +135,7 @@ fn effect(frame: &Frame, mode: ModeId, action: ActionId) -> Result<Effect, Strin
     }
     let afters = |before: &step::Before| -> Vec<step::After> {
         all()
-            .map(|at| after(model, mode, action, before, frame.state(&at)))
+            .map(|at| doing.after(before, frame.state(&at)))
             .collect()
     };
     let after = afters(&first);

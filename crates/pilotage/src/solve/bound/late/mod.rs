@@ -30,7 +30,7 @@ use super::ceiling::Ceiling;
 use super::cells::Cells;
 use super::frame::Frame;
 use super::law::Law;
-use super::step::{After, Before, after, before};
+use super::step::{After, Before, Doing};
 use crate::model::{ActionId, ModeId, Then};
 use crate::parallel;
 use crate::progress::Progress;
@@ -155,18 +155,18 @@ impl<'a> Planner<'a> {
             .flat_map(|x| (0..self.cells[1].count()).map(move |y| (x, y)))
             .map(|(x, y)| [self.cells[0].inside(x), self.cells[1].inside(y)])
             .collect();
+        let doing = Doing::new(frame.model, mode, action);
         let mut known: Vec<(Before, usize)> = Vec::new();
         let mut begins = Vec::with_capacity(all.len());
         for at in &all {
-            let before = before(frame.model, mode, action, frame.state(at));
+            let before = doing.before(frame.state(at));
             let alike =
                 |other: &Before| (other.mode, other.happened) == (before.mode, before.happened);
             let found = known.iter().find(|(other, _)| alike(other));
             let group = match (before.then, found) {
                 (Then::Continue, Some(found)) => found.1,
                 (Then::Continue, None) => {
-                    let to =
-                        |at: &[f64; 2]| after(frame.model, mode, action, &before, frame.state(at));
+                    let to = |at: &[f64; 2]| doing.after(&before, frame.state(at));
                     let group = self.group(frame.class_of[action], all.iter().map(to).collect());
                     known.push((before, group));
                     group
