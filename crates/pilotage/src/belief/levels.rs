@@ -18,6 +18,25 @@ const SAME: f64 = 1e-9;
 /// Most numbers that all levels and their steps may be.
 const MOST_NUMBERS: usize = 1 << 26;
 
+/// Where readings may be missing, levels would be without end: what a covariance is like depends on which of all readings before were
+/// missing. Such levels are one if no entry differs by more than this share of the smallest variance.
+const ALIKE: f64 = 0.01;
+
+/// How far the entries of a covariance may be from those of a level that it belongs to.
+fn tolerance(model: &Model, covariance: &DMatrix<f64>) -> f64 {
+    let stated = model.belief.level_tolerance;
+    if !model.misses_readings() {
+        return stated;
+    }
+    let variances = covariance.diagonal();
+    let uncertain = variances.iter().filter(|variance| **variance > 0.0);
+    let least = uncertain.fold(f64::INFINITY, |least, variance| least.min(*variance));
+    match least.is_finite() {
+        true => stated.max(ALIKE * least),
+        false => stated,
+    }
+}
+
 /// Index of a stratum: everything about a belief but its mode and its mean, one of finitely many. For a linear model it is an uncertainty
 /// level.
 pub type StratumId = usize;
@@ -187,7 +206,7 @@ impl LevelGraph {
         covariance: &DMatrix<f64>,
         time: usize,
     ) -> (StratumId, bool) {
-        match self.nearest(covariance, model.belief.level_tolerance, time) {
+        match self.nearest(covariance, tolerance(model, covariance), time) {
             Some(found) => (found, false),
             None if self.has_room(model, time) => (self.add(covariance.clone(), time), false),
             None => {
@@ -228,7 +247,7 @@ impl LevelGraph {
             return (level, false);
         }
         let time = (self.times[level] + 1).min(self.clock);
-        match self.nearest(covariance, model.belief.level_tolerance, time) {
+        match self.nearest(covariance, tolerance(model, covariance), time) {
             Some(found) if found == level && !self.settled[level] => {
                 (self.settle(model, class, covariance), false)
             }

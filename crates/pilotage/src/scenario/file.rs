@@ -283,7 +283,8 @@ pub(super) struct EpisodeTable {
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct BeliefTable {
-    /// Covariances whose entries differ by less than this are one uncertainty level. Default: 5e-7.
+    /// Covariances whose entries differ by less than this are one uncertainty level; where readings may be missing, by less than a
+    /// hundredth of the smallest variance. Default: 5e-7.
     pub level_tolerance: Option<f64>,
     /// Most levels that are computed, at least 1. Default: 400.
     pub level_limit: Option<u64>,
