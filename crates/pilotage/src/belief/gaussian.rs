@@ -10,7 +10,7 @@ pub fn normal_cdf(x: f64) -> f64 {
 }
 
 /// Standard normal density.
-pub fn normal_density(x: f64) -> f64 {
+pub(crate) fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() / (std::f64::consts::TAU).sqrt()
 }
 
@@ -31,7 +31,7 @@ pub fn interval_probability(mean: f64, variance: f64, interval: Interval) -> f64
 
 /// Probability that N(mean, covariance) lies outside the region, its sides taken one by one: never too small, and with all its
 /// digits where it is rare.
-pub fn exit_probability(mean: &[f64], covariance: &DMatrix<f64>, region: &Region) -> f64 {
+pub(crate) fn exit_probability(mean: &[f64], covariance: &DMatrix<f64>, region: &Region) -> f64 {
     // Farther than this a normal variable is outside less often than one in 1e19.
     const NEVER: f64 = 9.0;
     let beyond = |distance: f64, sd: f64| {

@@ -1,14 +1,14 @@
 //! What the agent knows: Kalman filter, uncertainty levels, hypotheses, and the decision process they form.
 
-pub mod filter;
+mod filter;
 pub mod gaussian;
-pub mod hypotheses;
-pub mod kalman;
-pub mod levels;
-pub mod mdp;
+mod hypotheses;
+pub(crate) mod kalman;
+mod levels;
+mod mdp;
 mod mixture;
 mod nearby;
-pub mod recall;
+pub(crate) mod recall;
 pub mod riccati;
 mod tracker;
 
@@ -18,5 +18,6 @@ pub use hypotheses::{Hypothesis, HypothesisSettings, HypothesisTracker, Merge};
 pub use kalman::{Correction, KalmanFilter};
 pub use levels::{ClassId, LevelGraph, StratumId};
 pub use mdp::{BeliefMdp, Survival};
-pub use recall::{ClusterId, Clusters, Recall};
+pub(crate) use recall::ClusterId;
+pub use recall::{Clusters, Recall};
 pub use tracker::{KalmanTracker, Reading, Tracker, Tracking};

@@ -17,10 +17,11 @@ use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use barriers::Barriers;
+pub(crate) use barriers::Barriers;
 pub use builder::{Clause, ModelBuilder};
 pub use effects::{Change, Effect, Outcome, Switch, Tally, apart};
-pub use error::{Fault, ModelError, Path, Place, Step, nearest, suggest};
+pub(crate) use error::nearest;
+pub use error::{Fault, ModelError, Path, Place, Step, suggest};
 pub use fingerprint::{Fingerprint, NotAFingerprint};
 pub use map::Map;
 pub use region::{Interval, Region};
@@ -391,12 +392,12 @@ impl Model {
     }
 
     /// Whether a reading may be missing at some step.
-    pub fn misses_readings(&self) -> bool {
+    pub(crate) fn misses_readings(&self) -> bool {
         self.phases().any(|step| self.sensor_at(step).present < 1.0)
     }
 
     /// Where something good is paid: the regions of all rewards and events above 0.
-    pub fn goals(&self) -> Vec<Region> {
+    pub(crate) fn goals(&self) -> Vec<Region> {
         let rewards = self
             .rewards
             .iter()

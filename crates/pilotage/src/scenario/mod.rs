@@ -141,7 +141,7 @@ pub enum Walls {
 
 impl TrueControl {
     /// Whether this is what the action does in this mode.
-    pub fn applies(&self, mode: ModeId, action: ActionId) -> bool {
+    pub(crate) fn applies(&self, mode: ModeId, action: ActionId) -> bool {
         applies(&self.actions, self.mode, mode, action)
     }
 }

@@ -22,7 +22,7 @@ use crate::policy::first_best;
 use crate::progress::Progress;
 
 /// Most state variables for which a grid of true states is fine enough to be of use.
-pub const MOST_VARIABLES: usize = 3;
+pub(crate) const MOST_VARIABLES: usize = 3;
 
 /// A solved decision process of true states.
 #[derive(Debug)]
@@ -39,7 +39,7 @@ pub struct StateMdp {
 
 /// The true states.
 #[derive(Debug, Clone)]
-pub enum Space {
+pub(crate) enum Space {
     /// Points of a grid; values between them are interpolated.
     Grid(Grid),
     /// The start hypotheses, which do not move.
@@ -130,17 +130,17 @@ impl StateMdp {
     }
 
     /// The belief decision process above it.
-    pub fn belief_mdp(&self) -> &BeliefMdp {
+    pub(crate) fn belief_mdp(&self) -> &BeliefMdp {
         &self.belief_mdp
     }
 
     /// The true states.
-    pub fn space(&self) -> &Space {
+    pub(crate) fn space(&self) -> &Space {
         &self.space
     }
 
     /// `F(., a)` in a mode, by state: what an action brings beyond its immediate reward.
-    pub fn future(&self, mode: ModeId, action: ActionId) -> &[f64] {
+    pub(crate) fn future(&self, mode: ModeId, action: ActionId) -> &[f64] {
         &self.future[mode * self.model().actions.len() + action]
     }
 
@@ -166,7 +166,7 @@ impl StateMdp {
     }
 
     /// The best action in a true state, ties to the first.
-    pub fn action(&self, mode: ModeId, state: &[f64]) -> ActionId {
+    pub(crate) fn action(&self, mode: ModeId, state: &[f64]) -> ActionId {
         first_best(&self.q_values(mode, state))
     }
 
@@ -293,7 +293,7 @@ fn seen(model: &Model, mode: ModeId, state: &[f64], action: ActionId) -> (f64, O
 ///
 /// # Errors
 /// [`crate::Error::Unsupported`] in the planner's name, with the reason and what would do.
-pub fn accepts(solver: &'static str, model: &Model) -> Result<()> {
+pub(crate) fn accepts(solver: &'static str, model: &Model) -> Result<()> {
     let (n, most) = (model.state_dim(), MOST_VARIABLES);
     let too_many = || {
         (n > most).then(|| {

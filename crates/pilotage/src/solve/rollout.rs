@@ -31,7 +31,7 @@ const MOST_DECISIONS: usize = 10_000_000;
 ///
 /// # Errors
 /// [`crate::Error::Setting`] for none, or too many to keep what they meet.
-pub fn check_runs(setting: &'static str, runs: usize) -> Result<()> {
+pub(crate) fn check_runs(setting: &'static str, runs: usize) -> Result<()> {
     let fits = (1..=MOST_RUNS).contains(&runs);
     ensure(setting, runs, fits, "1 to 1000000")
 }

@@ -10,11 +10,9 @@ mod observation;
 mod problem;
 mod robot;
 
-pub use cart_pole::Plant;
-pub use noise::Noise;
+pub(crate) use noise::Noise;
 pub use observation::Observation;
 pub use problem::ProblemWorld;
-pub use robot::RobotArena;
 
 use crate::model::{ActionId, ModeId, Then};
 use crate::random::{Rng, Role, stream};

@@ -98,7 +98,7 @@ impl Planner for Lqg {
 
 /// Which of its two uses a model is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Use {
+pub(crate) enum Use {
     /// A free control and a quadratic cost, solved exactly.
     Control,
     /// A choice among actions, for whatever reward the model pays.
@@ -106,7 +106,7 @@ pub enum Use {
 }
 
 /// Which use a model is for, or why it is for neither and what would do.
-pub fn use_of(model: &Model) -> std::result::Result<Use, String> {
+pub(crate) fn use_of(model: &Model) -> std::result::Result<Use, String> {
     let limited = |&(_, side): &(usize, Interval)| side != Interval::ALL;
     let fails = model.episode.alive.sides.iter().any(limited);
     let pays = !model.rewards.is_empty() || !model.events.is_empty() || fails;

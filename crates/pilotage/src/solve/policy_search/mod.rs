@@ -14,9 +14,9 @@
 //!
 //! What is found is the best of such automata, as far as the search has come; another shape of policy may earn more.
 
-pub mod cma;
+mod cma;
 pub mod failure;
-pub mod refine;
+mod refine;
 mod regulator;
 mod returns;
 mod search;
