@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::levels::{LevelGraph, StratumId};
+use super::reading::Reading;
 use super::recall::Recall;
-use super::tracker::Reading;
 use crate::model::{ActionId, Barriers, ModeId, Model, Switch, WallBelief, When};
 
 /// Largest magnitude of a mean, and of any number of a policy.

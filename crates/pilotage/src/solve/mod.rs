@@ -13,7 +13,7 @@ pub mod kbvi;
 mod learn;
 pub mod lqg;
 pub mod lqr;
-pub mod mdp;
+mod mdp;
 mod mls;
 pub mod policy_search;
 mod promise;
