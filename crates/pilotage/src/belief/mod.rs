@@ -1,4 +1,15 @@
-//! What the agent knows: Kalman filter, uncertainty levels, hypotheses, and the decision process they form.
+//! What the agent knows, and the decision process that it forms.
+//!
+//! - A [`Belief`] is what a policy reads: an uncertainty level, a mode and a mean.
+//! - A [`Tracker`] keeps one from step to step, by actions and [`Reading`]s; a reading may be numbers, a symbol or
+//!   [nothing](Reading::Nothing). Whatever makes trackers is a [`Tracking`], such as the [`Filter`], which is the Kalman filter as it
+//!   runs, and agents, learners and compilers ask for no more than that.
+//! - A [`BeliefMdp`] is a model as planners see it: what is paid at a belief, what happens, and how the mean moves. It is made of a model
+//!   and gives the filter ([`BeliefMdp::filter`]).
+//!
+//! Beneath these are the [`LevelGraph`] of the covariances that a filter can have, the [`KalmanFilter`] of the textbook and its
+//! [steady state](riccati), and probabilities under a [Gaussian](gaussian). A [`HypothesisTracker`] keeps several beliefs with a weight
+//! each, and [`Recall`] remembers where beliefs were.
 
 mod filter;
 pub mod gaussian;

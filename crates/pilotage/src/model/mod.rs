@@ -1,8 +1,19 @@
-//! What the agent assumes about its world: linear motion and sensing with Gaussian noise, actions,
-//! rewards, hidden modes and the events that change them.
+//! What the agent assumes about its world: linear motion and sensing with Gaussian noise, actions, rewards, hidden modes and the events
+//! that change them.
 //!
-//! A [`Model`] is plain data, checked once when it is built ([`Model::validate`]) or read from a TOML file
-//! ([`crate::scenario::read`]). What is *true* may differ: that is part of a [`crate::scenario::Scenario`], which no planner sees.
+//! Begin with a [`ModelBuilder`], which looks names up and checks everything, or with a TOML file ([`crate::scenario::read`]). Either
+//! gives a [`Model`]: plain data, which may be changed and checked again ([`Model::validate`]). What is *true* may differ: that is part
+//! of a [`crate::scenario::Scenario`], which no planner sees.
+//!
+//! What a model is made of:
+//!
+//! - *where one is*: [`StateVariable`], a [`Map`], [`StartHypothesis`] and the modes;
+//! - *what moves and is sensed*: [`Motion`], [`Sensor`] and [`Action`], and the [`Phase`]s in which they are others;
+//! - *what is paid and happens*: [`Reward`], [`Event`], [`QuadraticCost`] and [`Episode`], in a [`Region`] and during [`Steps`];
+//! - *how beliefs are kept*: [`BeliefSettings`].
+//!
+//! What a step does is said once for all who ask, by [`Model::effects`]; a [`Tally`] adds it up. A [`Fault`] is a mistake in a model, a
+//! [`ModelError`] one with its place in a file, and a [`Fingerprint`] tells whether two models are the same problem.
 
 mod barriers;
 mod builder;
