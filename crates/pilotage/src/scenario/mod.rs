@@ -4,8 +4,8 @@
 //! or made of a [`Model`] and a [`Truth`]; [`Scenario::assumed`] is the one in which a model holds. Planners and compilers are handed
 //! the model alone, so that nothing of the truth can reach them; worlds are made of the whole.
 //!
-//! [`schema`] describes the files. What may be true besides the model: another start, another motion ([`TrueMotion`]), other controls
-//! ([`TrueControl`]), [`Walls`], or a [`Simulator`] with laws of its own.
+//! [`schema`] describes the files. What a [`Truth`] may say: another start, other noise and controls ([`TrueMotion`]), [`Walls`], or a
+//! [`Simulator`] with laws of its own.
 
 mod builtin;
 mod cart_pole;
