@@ -16,7 +16,7 @@ use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options, evaluate};
 use pilotage::solve::value_iteration;
-use pilotage::solve::{Form, Request, ValueIteration, arkaq, kafaq, plan};
+use pilotage::solve::{Form, Request, ValueIteration, Worlds, arkaq, kafaq, plan};
 use pilotage::world::{ProblemWorld, World};
 use pilotage_thesis::baseline::{baselines, told};
 use rayon::prelude::*;
@@ -263,7 +263,7 @@ impl Run {
     }
 }
 
-fn run_kafaq(scenario: &Scenario, worlds: &kafaq::Worlds<'_>, seed: u64) -> pilotage::Result<Run> {
+fn run_kafaq(scenario: &Scenario, worlds: &Worlds<'_>, seed: u64) -> pilotage::Result<Run> {
     let clock = Instant::now();
     let settings = kafaq::Settings {
         seed,
@@ -283,7 +283,7 @@ fn run_kafaq(scenario: &Scenario, worlds: &kafaq::Worlds<'_>, seed: u64) -> pilo
 
 fn run_arkaq(
     scenario: &Scenario,
-    worlds: &arkaq::Worlds<'_>,
+    worlds: &Worlds<'_>,
     settings: &arkaq::Settings,
     seed: u64,
 ) -> Run {

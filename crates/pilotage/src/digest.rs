@@ -7,7 +7,7 @@ use std::fmt;
 
 /// A digest that takes in bytes as they come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Digest(u64);
+pub(crate) struct Digest(u64);
 
 impl fmt::Display for Digest {
     /// As in files: `fnv1a64-` and 16 hexadecimal digits.
@@ -18,26 +18,26 @@ impl fmt::Display for Digest {
 
 impl Digest {
     /// The digest of a text.
-    pub fn of(text: &str) -> Self {
+    pub(crate) fn of(text: &str) -> Self {
         let mut digest = Self::new();
         digest.write(text.as_bytes());
         digest
     }
 
     /// The digest of nothing.
-    pub const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self(0xcbf2_9ce4_8422_2325)
     }
 
     /// Takes in the bytes that follow.
-    pub fn write(&mut self, bytes: &[u8]) {
+    pub(crate) fn write(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
         }
     }
 
     /// The number for all bytes so far.
-    pub const fn number(self) -> u64 {
+    pub(crate) const fn number(self) -> u64 {
         self.0
     }
 }

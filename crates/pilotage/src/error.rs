@@ -3,8 +3,6 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use crate::belief::LARGEST;
-
 /// What went wrong, with the numbers and places needed to mend it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -149,13 +147,15 @@ pub enum Error {
     },
     /// An agent no longer had a belief to act on.
     #[error(
-        "in episode {episode} the mean of the belief is {LARGEST:e} or more after step {step}: the state, or the filter's numbers, grow without end; let the motion of the model die out, shorten its episodes, or solve again if the policy was edited"
+        "in episode {episode} the mean of the belief is {largest:e} or more after step {step}: the state, or the filter's numbers, grow without end; let the motion of the model die out, shorten its episodes, or solve again if the policy was edited"
     )]
     Lost {
         /// Number of the first episode in which it happened, from 0.
         episode: u64,
         /// Steps of that episode until then.
         step: usize,
+        /// The magnitude from which on filters keep no mean.
+        largest: f64,
     },
     /// A saved policy cannot be used here.
     #[error("{origin}: {reason}")]

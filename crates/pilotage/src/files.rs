@@ -171,7 +171,7 @@ mod nameless {
     use rustix::io::Errno;
 
     /// A file without a name; `None` where the file system has no such thing.
-    pub fn create(folder: &Path) -> Option<File> {
+    pub(super) fn create(folder: &Path) -> Option<File> {
         let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
         let file = open(folder, flags, Mode::from_raw_mode(0o666)).ok()?;
         // It gets its name by way of this folder.
@@ -180,7 +180,7 @@ mod nameless {
 
     /// Gives a file its name, in the place of what has it. A name cannot be taken over by a file without one, so that it has another for
     /// a moment.
-    pub fn persist(file: &File, folder: &Path, path: &Path) -> Result<()> {
+    pub(super) fn persist(file: &File, folder: &Path, path: &Path) -> Result<()> {
         static NAMES: AtomicU64 = AtomicU64::new(0);
         let source = format!("/proc/self/fd/{}", file.as_raw_fd());
         let between = loop {

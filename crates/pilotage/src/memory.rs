@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 /// [`Error::TooLarge`] for more than is allowed, [`Error::OutOfMemory`] for more than is free.
-pub fn check(model: &str, points: u64, mebibytes: u64, limit: u64) -> Result<()> {
+pub(crate) fn check(model: &str, points: u64, mebibytes: u64, limit: u64) -> Result<()> {
     let model = model.to_owned();
     if mebibytes > limit {
         return Err(Error::TooLarge {

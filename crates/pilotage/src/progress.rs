@@ -1,5 +1,7 @@
-//! The one hook by which algorithms report what they do. Algorithms hold mathematics only; progress bars, logs and
-//! plots hang here.
+//! The one hook by which algorithms report what they do. Algorithms hold mathematics only; progress bars, logs and plots hang here.
+//!
+//! Whatever takes time is handed a [`Progress`]: [`Silent`], or one of your own, which may also stop a learner
+//! ([`Progress::goes_on`]).
 
 use std::ops::ControlFlow;
 

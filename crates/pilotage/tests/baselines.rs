@@ -4,7 +4,7 @@
 
 use nalgebra::{DMatrix, dmatrix, dvector};
 use pilotage::belief::{Belief, BeliefMdp};
-use pilotage::model::{self, Interval, Model, Region};
+use pilotage::model::{self, Model};
 use pilotage::policy::Policy;
 use pilotage::progress::Silent;
 use pilotage::random::{Role, normal, stream};
@@ -12,7 +12,6 @@ use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Evaluation, Options};
 use pilotage::solve::lqg::{LqgController, NearestAction, Weights};
 use pilotage::solve::lqr::lqr_gain;
-use pilotage::solve::mdp::{self, StateMdp};
 use pilotage::solve::{Form, Lqg, Mls, Planner, Qmdp, Request, Solution, plan};
 
 fn scenario(name: &str) -> Scenario {
@@ -295,25 +294,4 @@ fn without_noise_both_know_everything() {
             assert_eq!(earned(&compiled, &scenario, 3).undiscounted.mean, 20.0);
         }
     }
-}
-
-#[test]
-fn who_leaves_the_living_fails_once() {
-    let mut model = scenario("corridor-unbounded").model;
-    model.actions.truncate(1);
-    model.motion.noise = dmatrix![0.0];
-    model.rewards[0].region = Region::everywhere();
-    model.episode.alive = Region::new(vec![(0, Interval::new(-1.0, 2.0))]);
-    model.episode.failure_reward = -5.0;
-    model.validate().unwrap();
-    let mdp = BeliefMdp::new(&model);
-    let settings = mdp::Settings {
-        points: Some(241),
-        ..Default::default()
-    };
-    let states = StateMdp::solve(&mdp, &settings, &Silent).unwrap();
-    // From 0.5 one step east is inside, the second is not, and nothing comes after it.
-    let expected = 1.0 + 0.75 * (1.0 - 5.0);
-    assert!((states.q_values(0, &[0.5])[0] - expected).abs() < 1e-9);
-    assert!((states.q_values(0, &[1.5])[0] - (1.0 - 5.0)).abs() < 1e-9);
 }

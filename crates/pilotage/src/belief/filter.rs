@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::levels::{LevelGraph, StratumId};
+use super::reading::Reading;
 use super::recall::Recall;
-use super::tracker::Reading;
 use crate::model::{ActionId, Barriers, ModeId, Model, Switch, WallBelief, When};
 
 /// Largest magnitude of a mean, and of any number of a policy.
@@ -140,7 +140,7 @@ impl Filter {
     }
 
     /// The same filter with another start; its level is one of the same level graph.
-    pub fn starting_at(mut self, start: &Belief) -> Self {
+    pub(crate) fn starting_at(mut self, start: &Belief) -> Self {
         self.start = (start.stratum, start.mode, start.mean.clone());
         self
     }
@@ -241,7 +241,7 @@ impl Filter {
     }
 
     /// What the sensor's reading of that number is expected to be at a state, after a step from a belief.
-    pub fn expected_reading(&self, from: &Belief, state: &[f64], reading: usize) -> f64 {
+    pub(crate) fn expected_reading(&self, from: &Belief, state: &[f64], reading: usize) -> f64 {
         self.sensed(self.phases[from.stratum], state, reading)
     }
 

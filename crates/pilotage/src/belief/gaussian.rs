@@ -5,12 +5,12 @@ use nalgebra::{DMatrix, DVector};
 use crate::model::{Interval, Region};
 
 /// Standard normal cdf.
-pub fn normal_cdf(x: f64) -> f64 {
+pub(crate) fn normal_cdf(x: f64) -> f64 {
     0.5 * libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 /// Standard normal density.
-pub fn normal_density(x: f64) -> f64 {
+pub(crate) fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() / (std::f64::consts::TAU).sqrt()
 }
 
@@ -31,7 +31,7 @@ pub fn interval_probability(mean: f64, variance: f64, interval: Interval) -> f64
 
 /// Probability that N(mean, covariance) lies outside the region, its sides taken one by one: never too small, and with all its
 /// digits where it is rare.
-pub fn exit_probability(mean: &[f64], covariance: &DMatrix<f64>, region: &Region) -> f64 {
+pub(crate) fn exit_probability(mean: &[f64], covariance: &DMatrix<f64>, region: &Region) -> f64 {
     // Farther than this a normal variable is outside less often than one in 1e19.
     const NEVER: f64 = 9.0;
     let beyond = |distance: f64, sd: f64| {
@@ -170,7 +170,7 @@ fn gauss_legendre_panels(low: f64, high: f64) -> impl Iterator<Item = (f64, f64)
 
 /// `points` nodes and weights for expectations under N(0, 1): `E f(x) ~ sum w_i f(x_i)`, exact for polynomials of degree
 /// `2 points - 1` (Gauss-Hermite; Golub and Welsch, 1969).
-pub fn gauss_hermite(points: usize) -> Vec<(f64, f64)> {
+pub(crate) fn gauss_hermite(points: usize) -> Vec<(f64, f64)> {
     let jacobi = DMatrix::from_fn(points, points, |i, j| {
         if i.abs_diff(j) == 1 {
             (i.max(j) as f64).sqrt()
@@ -196,4 +196,37 @@ pub fn gauss_hermite(points: usize) -> Vec<(f64, f64)> {
         rule[points / 2].0 = 0.0;
     }
     rule
+}
+
+#[cfg(test)]
+mod tests {
+    use super::gauss_hermite;
+
+    /// `points` points are exact up to degree `2 points - 1`, and no further.
+    #[test]
+    fn gauss_hermite_is_exact_as_far_as_it_should_be() {
+        for points in 1..=21 {
+            let rule = gauss_hermite(points);
+            let moment = |degree: i32| rule.iter().map(|(x, w)| w * x.powi(degree)).sum::<f64>();
+            // E x^2k = (2k - 1)!!, the odd ones vanish.
+            let mut exact = 1.0;
+            for k in 0..points as i32 {
+                assert!(
+                    (moment(2 * k) / exact - 1.0).abs() < 1e-10,
+                    "{points} points, degree {}",
+                    2 * k
+                );
+                assert!(moment(2 * k + 1).abs() / exact < 1e-10);
+                exact *= f64::from(2 * k + 1);
+            }
+            // The error of the next one is points!, by the remainder of the rule.
+            let factorial: f64 = (1..=points).map(|k| k as f64).product();
+            let missing = exact - moment(2 * points as i32);
+            assert!(
+                (missing / factorial - 1.0).abs() < 1e-3 || points > 12,
+                "{points}: {missing}"
+            );
+            assert!(missing > 0.0);
+        }
+    }
 }

@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::filter::{Belief, Filter};
 use super::mdp::BeliefMdp;
-use super::tracker::{Reading, Tracker};
+use super::reading::Reading;
+use super::tracker::Tracker;
 use crate::error::{Error, Result};
 use crate::model::ActionId;
 

@@ -95,7 +95,7 @@ pub(crate) fn distance(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
 }
 
 /// A matrix `L` with `L L' = covariance`, for any positive semi-definite covariance; columns without variance are left out.
-pub fn square_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn square_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let eigen = covariance.clone().symmetric_eigen();
     let largest = eigen.eigenvalues.amax();
     let kept: Vec<usize> = (0..eigen.eigenvalues.len())

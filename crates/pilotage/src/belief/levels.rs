@@ -110,7 +110,7 @@ impl LevelGraph {
     }
 
     /// The same for episodes of so many steps: levels tell the time up to the last, at which they are over.
-    pub fn within(model: &Model, starts: &[DMatrix<f64>], horizon: Option<usize>) -> Self {
+    pub(crate) fn within(model: &Model, starts: &[DMatrix<f64>], horizon: Option<usize>) -> Self {
         let mut graph = Self::with_classes(model);
         graph.clock = horizon.unwrap_or_else(|| model.clock());
         graph.ends = horizon.is_some();
@@ -322,14 +322,14 @@ impl LevelGraph {
     }
 
     /// Whether an episode is over at a level.
-    pub fn is_over(&self, level: StratumId) -> bool {
+    pub(crate) fn is_over(&self, level: StratumId) -> bool {
         self.ends && self.times[level] == self.clock
     }
 
     /// Covariance of the next mean around its prediction after a step of a class: `K S K'`. Where levels were cut, what the step
     /// would leave of the uncertainty is not what the level it leads to has, and the mean moves by the difference that is true of these
     /// two, `P- - P`, so that looking is not worth more than it tells.
-    pub fn mean_covariance(&self, level: StratumId, class: ClassId) -> DMatrix<f64> {
+    pub(crate) fn mean_covariance(&self, level: StratumId, class: ClassId) -> DMatrix<f64> {
         let step = &self.steps[level][class];
         if !step.cut {
             return step.correction.mean_covariance();
@@ -445,7 +445,7 @@ impl LevelGraph {
     ///
     /// # Errors
     /// [`Error::NoSteadyState`], with the direction that grows.
-    pub fn check_bounded(&self, model: &Model) -> Result<()> {
+    pub(crate) fn check_bounded(&self, model: &Model) -> Result<()> {
         if self.converged {
             return Ok(());
         }

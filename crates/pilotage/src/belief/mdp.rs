@@ -177,10 +177,10 @@ impl BeliefMdp {
         self.levels.check(&self.model)
     }
 
-    /// Checks that no uncertainty grows for ever, see [`LevelGraph::check_bounded`].
+    /// Checks that no uncertainty grows for ever. Levels that were cut at the limit while they still shrank will do.
     ///
     /// # Errors
-    /// As there.
+    /// [`crate::Error::NoSteadyState`], with the direction that grows.
     pub fn check_bounded(&self) -> Result<()> {
         self.levels.check_bounded(&self.model)
     }

@@ -40,7 +40,7 @@ struct Learned {
 
 impl Mixture {
     /// The mixture of a model whose hypotheses can be kept by one filter; `mean` is the mean of all, `n` long.
-    pub fn of(model: &Model, levels: &LevelGraph, mean: &DVector<f64>) -> Option<Self> {
+    pub(super) fn of(model: &Model, levels: &LevelGraph, mean: &DVector<f64>) -> Option<Self> {
         if !suits(model) {
             return None;
         }
@@ -66,12 +66,12 @@ impl Mixture {
     }
 
     /// Covariance of every hypothesis at a level, `n x n`; 0 where they are points.
-    pub fn covariance(&self, level: StratumId) -> &DMatrix<f64> {
+    pub(super) fn covariance(&self, level: StratumId) -> &DMatrix<f64> {
         &self.learned[level].covariance
     }
 
     /// Weight and mean of each hypothesis.
-    pub fn hypotheses(&self, level: StratumId, mean: &[f64]) -> Vec<(f64, DVector<f64>)> {
+    pub(super) fn hypotheses(&self, level: StratumId, mean: &[f64]) -> Vec<(f64, DVector<f64>)> {
         let Learned {
             information,
             gained,

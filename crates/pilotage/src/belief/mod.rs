@@ -1,14 +1,26 @@
-//! What the agent knows: Kalman filter, uncertainty levels, hypotheses, and the decision process they form.
+//! What the agent knows, and the decision process that it forms.
+//!
+//! - A [`Belief`] is what a policy reads: an uncertainty level, a mode and a mean.
+//! - A [`Tracker`] keeps one from step to step, by actions and [`Reading`]s; a reading may be numbers, a symbol or
+//!   [nothing](Reading::Nothing). Whatever makes trackers is a [`Tracking`], such as the [`Filter`], which is the Kalman filter as it
+//!   runs, and agents, learners and compilers ask for no more than that.
+//! - A [`BeliefMdp`] is a model as planners see it: what is paid at a belief, what happens, and how the mean moves. It is made of a model
+//!   and gives the filter ([`BeliefMdp::filter`]).
+//!
+//! Beneath these are the [`LevelGraph`] of the covariances that a filter can have, the [`KalmanFilter`] of the textbook and its
+//! [steady state](riccati), and probabilities under a [Gaussian](gaussian). A [`HypothesisTracker`] keeps several beliefs with a weight
+//! each, and [`Recall`] remembers where beliefs were.
 
-pub mod filter;
+mod filter;
 pub mod gaussian;
-pub mod hypotheses;
-pub mod kalman;
-pub mod levels;
-pub mod mdp;
+mod hypotheses;
+pub(crate) mod kalman;
+mod levels;
+mod mdp;
 mod mixture;
 mod nearby;
-pub mod recall;
+mod reading;
+pub(crate) mod recall;
 pub mod riccati;
 mod tracker;
 
@@ -18,5 +30,7 @@ pub use hypotheses::{Hypothesis, HypothesisSettings, HypothesisTracker, Merge};
 pub use kalman::{Correction, KalmanFilter};
 pub use levels::{ClassId, LevelGraph, StratumId};
 pub use mdp::{BeliefMdp, Survival};
-pub use recall::{ClusterId, Clusters, Recall};
-pub use tracker::{KalmanTracker, Reading, Tracker, Tracking};
+pub use reading::Reading;
+pub(crate) use recall::ClusterId;
+pub use recall::{Clusters, Recall};
+pub use tracker::{KalmanTracker, Tracker, Tracking};

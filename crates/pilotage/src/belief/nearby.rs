@@ -16,7 +16,7 @@ pub(super) struct Nearby {
 
 impl Nearby {
     /// Takes in the matrix of a group at a place of the list. One that is not finite is near to nothing.
-    pub fn insert(&mut self, matrix: &DMatrix<f64>, group: usize, place: usize) {
+    pub(super) fn insert(&mut self, matrix: &DMatrix<f64>, group: usize, place: usize) {
         let mean = weighted_mean(matrix);
         if mean.is_finite() {
             self.order.insert((group, rising(mean), place));
@@ -24,7 +24,7 @@ impl Nearby {
     }
 
     /// Of the matrices of a group no entry of which is farther off than the tolerance, the place of the nearest; the first of equals.
-    pub fn nearest(
+    pub(super) fn nearest(
         &self,
         list: &[DMatrix<f64>],
         to: &DMatrix<f64>,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::{ActionId, Interval, ModeId, Model};
 
 /// Number of a cluster.
-pub type ClusterId = usize;
+pub(crate) type ClusterId = usize;
 
 /// Clusters of belief means: a mean is in the one whose centre is nearest, lengths measured by the world's outer bounds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,22 +40,17 @@ impl Clusters {
     }
 
     /// Number of clusters.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.centres.len()
     }
 
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.centres.is_empty()
-    }
-
     /// Their centres, in units of the state.
-    pub fn centres(&self) -> &[Vec<f64>] {
+    pub(crate) fn centres(&self) -> &[Vec<f64>] {
         &self.centres
     }
 
     /// The cluster of a mean; the first of equals. Allocates nothing.
-    pub fn nearest(&self, mean: &[f64]) -> ClusterId {
+    pub(crate) fn nearest(&self, mean: &[f64]) -> ClusterId {
         let mut best = (0, f64::INFINITY);
         for (id, centre) in self.centres.iter().enumerate() {
             let distance = self.distance(centre, mean);
@@ -70,14 +65,14 @@ impl Clusters {
         let finite = |bounds: &Interval| bounds.width() > 0.0 && bounds.width().is_finite();
         let place =
             |centre: &Vec<f64>| centre.len() == states && centre.iter().all(|x| x.is_finite());
-        !self.is_empty()
+        !self.centres.is_empty()
             && self.bounds.len() == states
             && self.bounds.iter().all(finite)
             && self.centres.iter().all(place)
     }
 
     /// Squared distance between two clusters, 1 for opposite corners of the world.
-    pub fn between(&self, a: ClusterId, b: ClusterId) -> f64 {
+    pub(crate) fn between(&self, a: ClusterId, b: ClusterId) -> f64 {
         self.distance(&self.centres[a], &self.centres[b])
     }
 
@@ -103,23 +98,23 @@ impl Recall {
     }
 
     /// The clusters that means fall into.
-    pub fn clusters(&self) -> &Clusters {
+    pub(crate) fn clusters(&self) -> &Clusters {
         &self.clusters
     }
 
     /// The mode of the mean that an episode starts with.
-    pub fn first(&self, mean: &[f64]) -> ModeId {
+    pub(crate) fn first(&self, mean: &[f64]) -> ModeId {
         self.first[self.clusters.nearest(mean)]
     }
 
     /// The mode of a mean that was reached by an action. Allocates nothing.
-    pub fn next(&self, before: ModeId, action: ActionId, mean: &[f64]) -> ModeId {
+    pub(crate) fn next(&self, before: ModeId, action: ActionId, mean: &[f64]) -> ModeId {
         let row = (before * self.actions + action) * self.clusters.len();
         self.next[row + self.clusters.nearest(mean)]
     }
 
     /// The same with some modes put for others: `into` says by mode which one, itself if it stays. Those that stay keep their order.
-    pub fn merged(&self, into: &[ModeId]) -> Self {
+    pub(crate) fn merged(&self, into: &[ModeId]) -> Self {
         let stays = |mode: ModeId| into[mode] == mode;
         let staying = (0..into.len()).filter(|mode| stays(*mode));
         let mut number = vec![0; into.len()];
@@ -151,6 +146,6 @@ impl Recall {
 }
 
 /// A number scaled to `[0, 1]` over finite bounds; one outside is that of the nearest end.
-pub fn scaled(bounds: &Interval, x: f64) -> f64 {
+pub(crate) fn scaled(bounds: &Interval, x: f64) -> f64 {
     ((x - bounds.low) / bounds.width()).clamp(0.0, 1.0)
 }

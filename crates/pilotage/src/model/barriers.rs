@@ -7,33 +7,28 @@ use super::{Interval, Map, Model};
 /// Without a map they are the bounds, taken one variable at a time. With one, the first two variables are stopped by its edges,
 /// blocked cells and thin walls, and the others by their bounds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Barriers {
+pub(crate) struct Barriers {
     pub(crate) bounds: Vec<Interval>,
     pub(crate) map: Option<Map>,
 }
 
 impl Barriers {
     /// The walls of a model's world.
-    pub fn new(model: &Model) -> Self {
+    pub(crate) fn new(model: &Model) -> Self {
         Self {
             bounds: model.state.iter().map(|variable| variable.bounds).collect(),
             map: model.map.clone(),
         }
     }
 
-    /// Number of state variables.
-    pub fn states(&self) -> usize {
-        self.bounds.len()
-    }
-
     /// Moves `to` back to where the straight way from `from` to it is stopped. Both have length `n`.
-    pub fn stop(&self, from: &[f64], to: &mut [f64]) {
+    pub(crate) fn stop(&self, from: &[f64], to: &mut [f64]) {
         let drawn = self.on_map(to, |map, to| map.travel([from[0], from[1]], to));
         self.clamp(to, drawn);
     }
 
     /// Moves a point, of length `n`, to the nearest one where a state can be.
-    pub fn confine(&self, point: &mut [f64]) {
+    pub(crate) fn confine(&self, point: &mut [f64]) {
         let drawn = self.on_map(point, Map::nearest_free);
         self.clamp(point, drawn);
     }

@@ -81,7 +81,7 @@ impl Model {
     ///
     /// An event that leaves the mode as it is stands in the way of those after it, unless it ends or restarts the episode: who goes on
     /// knows that it has not happened.
-    pub fn switches(&self) -> Vec<Switch> {
+    pub(crate) fn switches(&self) -> Vec<Switch> {
         let (before, after): (Vec<&Event>, Vec<&Event>) = self
             .events
             .iter()
@@ -179,7 +179,7 @@ impl Model {
     }
 
     /// Whether anything leads back to the start.
-    pub fn restarts(&self) -> bool {
+    pub(crate) fn restarts(&self) -> bool {
         let ends = self.actions.iter().map(|action| action.then);
         let mut ends = ends.chain(self.events.iter().map(|event| event.then));
         ends.any(|then| then == Then::Restart)

@@ -19,20 +19,20 @@ pub struct Path(Vec<Step>);
 
 impl Path {
     /// The path of one key at the top of the file.
-    pub fn new(key: &str) -> Self {
+    pub(crate) fn new(key: &str) -> Self {
         Self::default().key(key)
     }
 
     /// The path of a key inside this table.
     #[must_use]
-    pub fn key(mut self, key: &str) -> Self {
+    pub(crate) fn key(mut self, key: &str) -> Self {
         self.0.push(Step::Key(key.to_owned()));
         self
     }
 
     /// The path of an item of this list.
     #[must_use]
-    pub fn index(mut self, index: usize) -> Self {
+    pub(crate) fn index(mut self, index: usize) -> Self {
         self.0.push(Step::Index(index));
         self
     }
@@ -82,7 +82,7 @@ pub struct Fault {
 
 impl Fault {
     /// A fault of the value at `path`.
-    pub fn new(path: Path, message: impl Into<String>, hint: impl Into<String>) -> Self {
+    pub(crate) fn new(path: Path, message: impl Into<String>, hint: impl Into<String>) -> Self {
         Self {
             path,
             on_key: false,
@@ -92,7 +92,7 @@ impl Fault {
     }
 
     /// A fault of the last key of `path`.
-    pub fn of_key(path: Path, message: impl Into<String>, hint: impl Into<String>) -> Self {
+    pub(crate) fn of_key(path: Path, message: impl Into<String>, hint: impl Into<String>) -> Self {
         Self {
             on_key: true,
             ..Self::new(path, message, hint)
@@ -115,7 +115,7 @@ impl Fault {
 }
 
 /// The known name that is nearest to `name`, if one is near enough to have been meant.
-pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let folded = name.to_lowercase();
     known
         .into_iter()
@@ -156,7 +156,7 @@ pub struct Place {
 
 impl Place {
     /// The place of a span of bytes; a span that is not inside the text is moved to where it fits.
-    pub fn of(span: Range<usize>, text: &str) -> Self {
+    pub(crate) fn of(span: Range<usize>, text: &str) -> Self {
         let mut start = span.start.min(text.len());
         while !text.is_char_boundary(start) {
             start -= 1;

@@ -106,7 +106,7 @@ impl Map {
     }
 
     /// The nearest point where a state can be; `point` itself where every cell is blocked. Ties go to the south, then the west.
-    pub fn nearest_free(&self, point: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn nearest_free(&self, point: [f64; 2]) -> [f64; 2] {
         if self.free(point) {
             return point;
         }

@@ -1,8 +1,19 @@
-//! What the agent assumes about its world: linear motion and sensing with Gaussian noise, actions,
-//! rewards, hidden modes and the events that change them.
+//! What the agent assumes about its world: linear motion and sensing with Gaussian noise, actions, rewards, hidden modes and the events
+//! that change them.
 //!
-//! A [`Model`] is plain data, checked once when it is built ([`Model::validate`]) or read from a TOML file
-//! ([`crate::scenario::read`]). What is *true* may differ: that is part of a [`crate::scenario::Scenario`], which no planner sees.
+//! Begin with a [`ModelBuilder`], which looks names up and checks everything, or with a TOML file ([`crate::scenario::read`]). Either
+//! gives a [`Model`]: plain data, which may be changed and checked again ([`Model::validate`]). What is *true* may differ: that is part
+//! of a [`crate::scenario::Scenario`], which no planner sees.
+//!
+//! What a model is made of:
+//!
+//! - *where one is*: [`StateVariable`], a [`Map`], [`StartHypothesis`] and the modes;
+//! - *what moves and is sensed*: [`Motion`], [`Sensor`] and [`Action`], and the [`Phase`]s in which they are others;
+//! - *what is paid and happens*: [`Reward`], [`Event`], [`QuadraticCost`] and [`Episode`], in a [`Region`] and during [`Steps`];
+//! - *how beliefs are kept*: [`BeliefSettings`].
+//!
+//! What a step does is said once for all who ask, by [`Model::effects`]; a [`Tally`] adds it up. A [`Fault`] is a mistake in a model, a
+//! [`ModelError`] one with its place in a file, and a [`Fingerprint`] tells whether two models are the same problem.
 
 mod barriers;
 mod builder;
@@ -17,10 +28,11 @@ use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use barriers::Barriers;
+pub(crate) use barriers::Barriers;
 pub use builder::{Clause, ModelBuilder};
 pub use effects::{Change, Effect, Outcome, Switch, Tally, apart};
-pub use error::{Fault, ModelError, Path, Place, Step, nearest, suggest};
+pub(crate) use error::nearest;
+pub use error::{Fault, ModelError, Path, Place, Step, suggest};
 pub use fingerprint::{Fingerprint, NotAFingerprint};
 pub use map::Map;
 pub use region::{Interval, Region};
@@ -391,12 +403,12 @@ impl Model {
     }
 
     /// Whether a reading may be missing at some step.
-    pub fn misses_readings(&self) -> bool {
+    pub(crate) fn misses_readings(&self) -> bool {
         self.phases().any(|step| self.sensor_at(step).present < 1.0)
     }
 
     /// Where something good is paid: the regions of all rewards and events above 0.
-    pub fn goals(&self) -> Vec<Region> {
+    pub(crate) fn goals(&self) -> Vec<Region> {
         let rewards = self
             .rewards
             .iter()

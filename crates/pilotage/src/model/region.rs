@@ -125,7 +125,7 @@ mod maybe_infinite {
         Negative,
     }
 
-    pub fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    pub(super) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
         let number = if value.is_finite() {
             Number::Finite(*value)
         } else {
@@ -138,7 +138,7 @@ mod maybe_infinite {
         number.serialize(serializer)
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
         Ok(match Number::deserialize(deserializer)? {
             Number::Finite(value) => value,
             Number::Infinite(Infinite::Positive) => f64::INFINITY,

@@ -153,7 +153,7 @@ impl Place {
     }
 
     /// Lower corner; a point is its own.
-    pub fn lower(&self) -> &[f64] {
+    pub(crate) fn lower(&self) -> &[f64] {
         match self {
             Self::Point(point) => point,
             Self::Segment { lower, .. } => lower,
@@ -161,7 +161,7 @@ impl Place {
     }
 
     /// Upper corner; a point is its own.
-    pub fn upper(&self) -> &[f64] {
+    pub(crate) fn upper(&self) -> &[f64] {
         match self {
             Self::Point(point) => point,
             Self::Segment { upper, .. } => upper,
@@ -169,7 +169,7 @@ impl Place {
     }
 
     /// Volume of a segment; 0 for a point.
-    pub fn volume(&self) -> f64 {
+    pub(crate) fn volume(&self) -> f64 {
         match self {
             Self::Point(_) => 0.0,
             Self::Segment { lower, upper, .. } => lower
@@ -241,7 +241,11 @@ impl Automaton {
 
     /// Nodes among which a belief of this level and mode finds its own. A level or mode without nodes borrows those of the
     /// nearest level in the same mode, then of any mode.
-    pub fn candidates(&self, level: StratumId, mode: ModeId) -> impl Iterator<Item = NodeId> {
+    pub(crate) fn candidates(
+        &self,
+        level: StratumId,
+        mode: ModeId,
+    ) -> impl Iterator<Item = NodeId> {
         let gap = move |node: &Node| (node.mode != mode, node.gap(level));
         let smallest = self.nodes.iter().map(gap).min();
         (0..self.nodes.len()).filter(move |&id| Some(gap(&self.nodes[id])) == smallest)
@@ -283,17 +287,6 @@ impl Automaton {
             })
             .min_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)))
             .map(|(id, _, _)| id)
-    }
-
-    /// Levels that some node stands for.
-    pub fn levels_used(&self) -> usize {
-        (0..self.levels.len())
-            .filter(|&level| {
-                self.nodes
-                    .iter()
-                    .any(|node| node.levels.0 <= level && level <= node.levels.1)
-            })
-            .count()
     }
 }
 

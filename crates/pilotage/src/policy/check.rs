@@ -36,7 +36,7 @@ pub(super) struct Fault {
 }
 
 impl Fault {
-    pub fn new(message: impl Into<String>) -> Self {
+    pub(super) fn new(message: impl Into<String>) -> Self {
         Self {
             place: Vec::new(),
             message: message.into(),
@@ -110,7 +110,7 @@ impl Sizes {
 impl PolicyTable {
     /// # Errors
     /// The first fault found.
-    pub fn check(&self) -> Checked {
+    pub(super) fn check(&self) -> Checked {
         let sizes = Sizes {
             states: self.states.len(),
             readings: self.filter.h.len(),

@@ -35,7 +35,7 @@ impl PolicyTable {
     ///
     /// # Errors
     /// A fault where the automaton's levels and actions are not those of its filter.
-    pub fn new(automaton: &Automaton) -> Checked<Self> {
+    pub(super) fn new(automaton: &Automaton) -> Checked<Self> {
         let filter = &automaton.filter;
         Ok(Self {
             problem: automaton.problem.clone(),
@@ -67,7 +67,7 @@ impl PolicyTable {
     ///
     /// # Errors
     /// A fault of the map's drawing.
-    pub fn automaton(self) -> Checked<Automaton> {
+    pub(super) fn automaton(self) -> Checked<Automaton> {
         let levels = self.filter.levels.iter();
         let levels = levels.map(|level| level.covariance.concat()).collect();
         let (switches, recall) = match self.memory {

@@ -14,19 +14,19 @@ pub struct Coordinates {
 
 impl Coordinates {
     /// Number of coordinates.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.rows.len()
     }
 
     /// Writes the coordinates of a mean (length `n`) to `target`, which is at least as long as there are coordinates.
-    pub fn write(&self, mean: &[f64], target: &mut [f64]) {
+    pub(crate) fn write(&self, mean: &[f64], target: &mut [f64]) {
         for (row, value) in self.rows.iter().zip(target) {
             *value = row.iter().zip(mean).map(|(w, m)| w * m).sum();
         }
     }
 
     /// The coordinates of a mean.
-    pub fn of(&self, mean: &[f64]) -> Vec<f64> {
+    pub(crate) fn of(&self, mean: &[f64]) -> Vec<f64> {
         let mut place = vec![0.0; self.count()];
         self.write(mean, &mut place);
         place

@@ -126,7 +126,7 @@ pub(super) struct Quoted {
 
 impl Quoted {
     /// Whether a character belongs to a text in quotes; the quotes do, too.
-    pub fn after(&mut self, c: char) -> bool {
+    pub(super) fn after(&mut self, c: char) -> bool {
         let was_inside = self.inside;
         if self.escaped {
             self.escaped = false;

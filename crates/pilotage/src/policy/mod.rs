@@ -1,4 +1,8 @@
-//! Policies: what to do at a belief. The one that people keep is the [`Automaton`].
+//! Policies: what to do at a belief.
+//!
+//! A [`Policy`] is whatever says what to do at every belief. The one that people keep is the [`Automaton`]: [`Node`]s, each with a
+//! [`Place`] among the beliefs and an action, and the filter that keeps the belief. It is saved and read as JSON ([`Automaton::save`],
+//! [`Automaton::load`], [`schema`]). An [`AutomatonRunner`] runs it without allocating.
 
 mod automaton;
 mod builder;

@@ -58,7 +58,7 @@ impl CartPole {
     }
 
     /// Covariance (`4 x 4`) of the noise of one step: `B q B' + 1e-9 I` with the variance `q` of the force.
-    pub fn motion_noise(&self) -> DMatrix<f64> {
+    pub(crate) fn motion_noise(&self) -> DMatrix<f64> {
         let (_, b) = self.discretised();
         &b * self.force_noise * b.transpose() + DMatrix::identity(4, 4) * STATE_NOISE
     }

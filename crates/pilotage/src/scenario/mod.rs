@@ -1,7 +1,11 @@
 //! A model and the world it is tried in: what the agent assumes, and what is true where that differs.
 //!
-//! A [`Scenario`] is read from a TOML file ([`read`]), or made of a [`Model`] and a [`Truth`]. Planners and compilers are handed the
-//! model alone, so that nothing of the truth can reach them; worlds are made of the whole.
+//! A [`Scenario`] is [found](find) by the name of a built-in model ([`names`]) or the path of a TOML file, read from text ([`read`]),
+//! or made of a [`Model`] and a [`Truth`]; [`Scenario::assumed`] is the one in which a model holds. Planners and compilers are handed
+//! the model alone, so that nothing of the truth can reach them; worlds are made of the whole.
+//!
+//! [`schema`] describes the files. What a [`Truth`] may say: another start, other noise and controls ([`TrueMotion`]), [`Walls`], or a
+//! [`Simulator`] with laws of its own.
 
 mod builtin;
 mod cart_pole;
@@ -141,7 +145,7 @@ pub enum Walls {
 
 impl TrueControl {
     /// Whether this is what the action does in this mode.
-    pub fn applies(&self, mode: ModeId, action: ActionId) -> bool {
+    pub(crate) fn applies(&self, mode: ModeId, action: ActionId) -> bool {
         applies(&self.actions, self.mode, mode, action)
     }
 }

@@ -37,7 +37,7 @@ pub struct Robot {
 
 impl Robot {
     /// The arena of a model: its extent east and north, in metres.
-    pub fn arena(&self, model: &Model) -> [f64; 2] {
+    pub(crate) fn arena(&self, model: &Model) -> [f64; 2] {
         let width = |variable: usize| {
             let variable = model.state.get(variable);
             variable.map(|variable| variable.bounds.width() * self.cell)
@@ -47,7 +47,7 @@ impl Robot {
     }
 
     /// Where the middle of the robot can be along a state variable, in units of state.
-    pub fn room(&self, bounds: Interval) -> Interval {
+    pub(crate) fn room(&self, bounds: Interval) -> Interval {
         let margin = self.radius / self.cell;
         Interval::new(bounds.low + margin, bounds.high - margin)
     }

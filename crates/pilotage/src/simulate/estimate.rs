@@ -46,7 +46,7 @@ pub(crate) struct Moments {
 
 impl Moments {
     /// Takes in the next number.
-    pub fn add(&mut self, value: f64) {
+    pub(super) fn add(&mut self, value: f64) {
         self.count += 1;
         self.sum += value;
         let before = value - self.mean;
@@ -55,12 +55,12 @@ impl Moments {
     }
 
     /// Numbers so far.
-    pub fn count(&self) -> u64 {
+    pub(super) fn count(&self) -> u64 {
         self.count
     }
 
     /// Mean and standard error; those of no number are none.
-    pub fn estimate(&self) -> Estimate {
+    pub(super) fn estimate(&self) -> Estimate {
         let count = self.count as f64;
         // The plain sum has the digits of `Estimate::of`.
         Estimate::from_squares(self.sum / count, self.squares, count)

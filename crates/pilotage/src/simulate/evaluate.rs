@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::estimate::{Estimate, Moments};
 use super::{Agent, Episode, TrackingAgent, run_episode};
-use crate::belief::Tracking;
+use crate::belief::{LARGEST, Tracking};
 use crate::error::{Error, Result};
 use crate::parallel;
 use crate::policy::Policy;
@@ -70,7 +70,11 @@ impl Evaluation {
     pub fn check(&self) -> Result<()> {
         match self.lost {
             None => Ok(()),
-            Some(Lost { episode, step, .. }) => Err(Error::Lost { episode, step }),
+            Some(Lost { episode, step, .. }) => Err(Error::Lost {
+                episode,
+                step,
+                largest: LARGEST,
+            }),
         }
     }
 }

@@ -1,4 +1,11 @@
 //! Running policies in worlds, and what they earn.
+//!
+//! [`evaluate`] runs a policy for many episodes of a scenario and gives an [`Evaluation`], each of its numbers an [`Estimate`] with a
+//! standard error; [`compare`] runs two of them through the same episodes; [`life`] asks how long it takes until one fails, and
+//! [`wake_up`] what becomes of an agent that is carried elsewhere.
+//!
+//! One episode is [`run_episode`]: an [`Agent`], such as the [`TrackingAgent`] of a tracker and a policy, in a
+//! [`World`].
 
 mod agent;
 mod estimate;

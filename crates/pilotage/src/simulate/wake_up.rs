@@ -10,7 +10,7 @@ use super::estimate::Moments;
 use super::evaluate::{Runner, run_all};
 use super::{Agent, Estimate, TrackingAgent, run_episode};
 use crate::belief::{
-    Belief, BeliefMdp, Filter, HypothesisSettings, HypothesisTracker, Reading, Tracker,
+    Belief, BeliefMdp, Filter, HypothesisSettings, HypothesisTracker, LARGEST, Reading, Tracker,
 };
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Region};
@@ -410,7 +410,11 @@ impl Tally {
 
     fn summary(self) -> Result<WakeUp> {
         if let Some((episode, step)) = self.beliefless {
-            return Err(Error::Lost { episode, step });
+            return Err(Error::Lost {
+                episode,
+                step,
+                largest: LARGEST,
+            });
         }
         let (lost, told) = (self.lost.summary(), self.told.summary());
         let ratio = lost.success.mean / told.success.mean;

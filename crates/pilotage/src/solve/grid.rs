@@ -50,7 +50,7 @@ impl Default for Settings {
 
 /// Evenly spaced points along one variable.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Axis {
+pub(crate) struct Axis {
     /// First point.
     pub low: f64,
     /// Distance between points.
@@ -63,12 +63,12 @@ pub struct Axis {
 
 impl Axis {
     /// `count` points from `low` to `high`, both included.
-    pub fn new(low: f64, high: f64, count: usize) -> Self {
+    pub(crate) fn new(low: f64, high: f64, count: usize) -> Self {
         Self::stepped(low, (high - low) / (count - 1) as f64, count)
     }
 
     /// `count` points, a step apart, the first of them `low`.
-    pub const fn stepped(low: f64, step: f64, count: usize) -> Self {
+    pub(crate) const fn stepped(low: f64, step: f64, count: usize) -> Self {
         Self {
             low,
             step,
@@ -78,7 +78,7 @@ impl Axis {
     }
 
     /// The same points, with so many times as many steps between them.
-    pub fn finer(&self, factor: usize) -> Self {
+    pub(crate) fn finer(&self, factor: usize) -> Self {
         let lattice = self
             .lattice
             .map(|(place, number, length, parts)| (place, number * factor, length, parts * factor));
@@ -91,7 +91,7 @@ impl Axis {
     }
 
     /// The same stretch, with points at `place` and at every multiple of `length` (above 0) from it; no fewer than before.
-    pub fn through(&self, place: f64, length: f64) -> Self {
+    pub(crate) fn through(&self, place: f64, length: f64) -> Self {
         let parts = (length / self.step).ceil().max(1.0);
         let step = length / parts;
         let before = ((place - self.low) / step).ceil().max(0.0);
@@ -106,13 +106,13 @@ impl Axis {
 
     /// `count` points that cover the bounds and as far beyond as what moves by `sd` a step can stray: one width and four standard
     /// deviations.
-    pub fn around(bounds: Interval, sd: f64, count: usize) -> Self {
+    pub(crate) fn around(bounds: Interval, sd: f64, count: usize) -> Self {
         let margin = bounds.width() + 4.0 * sd;
         Self::new(bounds.low - margin, bounds.high + margin, count)
     }
 
     /// Coordinate of a point.
-    pub fn at(&self, index: usize) -> f64 {
+    pub(crate) fn at(&self, index: usize) -> f64 {
         match self.lattice {
             None => self.low + self.step * index as f64,
             Some((place, number, length, parts)) => {
@@ -124,7 +124,7 @@ impl Axis {
 
 /// How values between points are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Interpolation {
+pub(crate) enum Interpolation {
     /// Straight lines: two points a variable.
     Linear,
     /// Cubic convolution (R. G. Keys, 1981): four points a variable, error of third order.
@@ -133,7 +133,7 @@ pub enum Interpolation {
 
 /// A regular grid; a function on it is a slice of [`Grid::len`] values, the last variable running fastest.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Grid {
+pub(crate) struct Grid {
     axes: Vec<Axis>,
     strides: Vec<usize>,
     len: usize,
@@ -185,7 +185,7 @@ impl Taps {
 
 impl Grid {
     /// A grid over the axes, first variable first.
-    pub fn new(axes: Vec<Axis>, interpolation: Interpolation) -> Self {
+    pub(crate) fn new(axes: Vec<Axis>, interpolation: Interpolation) -> Self {
         let mut strides = vec![1; axes.len()];
         for i in (0..axes.len().saturating_sub(1)).rev() {
             strides[i] = strides[i + 1] * axes[i + 1].count;
@@ -200,22 +200,17 @@ impl Grid {
     }
 
     /// Number of points.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether there are no points.
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
     /// The axes.
-    pub fn axes(&self) -> &[Axis] {
+    pub(crate) fn axes(&self) -> &[Axis] {
         &self.axes
     }
 
     /// Coordinates of a point.
-    pub fn point(&self, index: usize) -> Vec<f64> {
+    pub(crate) fn point(&self, index: usize) -> Vec<f64> {
         self.axes
             .iter()
             .zip(&self.strides)
@@ -224,7 +219,7 @@ impl Grid {
     }
 
     /// The function between the points; outside the grid it keeps the value at the edge.
-    pub fn interpolate(&self, values: &[f64], at: &[f64]) -> f64 {
+    pub(crate) fn interpolate(&self, values: &[f64], at: &[f64]) -> f64 {
         self.interpolate_from(values, at, 0, 0)
     }
 
@@ -253,7 +248,7 @@ impl Grid {
     }
 
     /// The average of a function around every point: `W(x) = E V(x + e)`, `e ~ N(0, covariance)`.
-    pub fn smoother(&self, covariance: &DMatrix<f64>) -> Smoother {
+    pub(crate) fn smoother(&self, covariance: &DMatrix<f64>) -> Smoother {
         let directions = square_root(covariance);
         let rule = normal_trapezoid();
         let passes = directions.column_iter().map(|direction| {
@@ -318,13 +313,13 @@ fn add_product(
 /// Averages functions on a grid over a Gaussian. A Gaussian is a sum of independent ones along the columns of a square root of
 /// its covariance, so it is done one column at a time, each with a fixed pattern of neighbours and weights.
 #[derive(Debug, Clone)]
-pub struct Smoother {
+pub(crate) struct Smoother {
     passes: Vec<Vec<(Vec<isize>, f64)>>,
 }
 
 impl Smoother {
     /// Applies the average to `values`, which has [`Grid::len`] entries.
-    pub fn apply(&self, grid: &Grid, values: &[f64]) -> Vec<f64> {
+    pub(crate) fn apply(&self, grid: &Grid, values: &[f64]) -> Vec<f64> {
         let mut current = values.to_vec();
         for kernel in &self.passes {
             current = convolve(grid, &current, kernel);

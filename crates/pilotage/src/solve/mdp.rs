@@ -9,7 +9,7 @@
 
 use nalgebra::DVector;
 
-pub use super::grid::Settings;
+pub(super) use super::grid::Settings;
 use super::grid::{Axis, Grid, Interpolation, Smoother};
 use super::refusals;
 use super::solver::refuse_if;
@@ -22,11 +22,11 @@ use crate::policy::first_best;
 use crate::progress::Progress;
 
 /// Most state variables for which a grid of true states is fine enough to be of use.
-pub const MOST_VARIABLES: usize = 3;
+pub(crate) const MOST_VARIABLES: usize = 3;
 
 /// A solved decision process of true states.
 #[derive(Debug)]
-pub struct StateMdp {
+pub(super) struct StateMdp {
     belief_mdp: BeliefMdp,
     space: Space,
     /// `V`, by mode, then state.
@@ -39,7 +39,7 @@ pub struct StateMdp {
 
 /// The true states.
 #[derive(Debug, Clone)]
-pub enum Space {
+pub(crate) enum Space {
     /// Points of a grid; values between them are interpolated.
     Grid(Grid),
     /// The start hypotheses, which do not move.
@@ -85,7 +85,7 @@ impl StateMdp {
     ///
     /// # Errors
     /// [`crate::Error::TooLarge`] and [`crate::Error::OutOfMemory`] where the grid does not fit the memory, [`crate::Error::Setting`] for settings out of range.
-    pub fn solve(
+    pub(super) fn solve(
         belief_mdp: &BeliefMdp,
         settings: &Settings,
         observer: &dyn Progress,
@@ -130,22 +130,22 @@ impl StateMdp {
     }
 
     /// The belief decision process above it.
-    pub fn belief_mdp(&self) -> &BeliefMdp {
+    pub(crate) fn belief_mdp(&self) -> &BeliefMdp {
         &self.belief_mdp
     }
 
     /// The true states.
-    pub fn space(&self) -> &Space {
+    pub(crate) fn space(&self) -> &Space {
         &self.space
     }
 
     /// `F(., a)` in a mode, by state: what an action brings beyond its immediate reward.
-    pub fn future(&self, mode: ModeId, action: ActionId) -> &[f64] {
+    pub(crate) fn future(&self, mode: ModeId, action: ActionId) -> &[f64] {
         &self.future[mode * self.model().actions.len() + action]
     }
 
     /// `Q(s, a)` of every action in a true state of length `n`; where the states are points, in the nearest of them.
-    pub fn q_values(&self, mode: ModeId, state: &[f64]) -> Vec<f64> {
+    pub(super) fn q_values(&self, mode: ModeId, state: &[f64]) -> Vec<f64> {
         let nearest = |points: &[DVector<f64>]| {
             let distance = |x: &DVector<f64>| (x - DVector::from_column_slice(state)).norm();
             (0..points.len()).fold(0, |best, i| {
@@ -166,7 +166,7 @@ impl StateMdp {
     }
 
     /// The best action in a true state, ties to the first.
-    pub fn action(&self, mode: ModeId, state: &[f64]) -> ActionId {
+    pub(crate) fn action(&self, mode: ModeId, state: &[f64]) -> ActionId {
         first_best(&self.q_values(mode, state))
     }
 
@@ -293,7 +293,7 @@ fn seen(model: &Model, mode: ModeId, state: &[f64], action: ActionId) -> (f64, O
 ///
 /// # Errors
 /// [`crate::Error::Unsupported`] in the planner's name, with the reason and what would do.
-pub fn accepts(solver: &'static str, model: &Model) -> Result<()> {
+pub(crate) fn accepts(solver: &'static str, model: &Model) -> Result<()> {
     let (n, most) = (model.state_dim(), MOST_VARIABLES);
     let too_many = || {
         (n > most).then(|| {
@@ -350,4 +350,38 @@ fn space(belief_mdp: &BeliefMdp, settings: &Settings) -> Result<Space> {
         axes.collect(),
         Interpolation::Linear,
     )))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use nalgebra::dmatrix;
+
+    use super::{Settings, StateMdp};
+    use crate::belief::BeliefMdp;
+    use crate::model::{Interval, Region};
+    use crate::progress::Silent;
+    use crate::scenario;
+
+    #[test]
+    fn who_leaves_the_living_fails_once() {
+        let mut model = scenario::find("corridor-unbounded").unwrap().model;
+        model.actions.truncate(1);
+        model.motion.noise = dmatrix![0.0];
+        model.rewards[0].region = Region::everywhere();
+        model.episode.alive = Region::new(vec![(0, Interval::new(-1.0, 2.0))]);
+        model.episode.failure_reward = -5.0;
+        model.validate().unwrap();
+        let mdp = BeliefMdp::new(&model);
+        let settings = Settings {
+            points: Some(241),
+            ..Default::default()
+        };
+        let states = StateMdp::solve(&mdp, &settings, &Silent).unwrap();
+        // From 0.5 one step east is inside, the second is not, and nothing comes after it.
+        let expected = 1.0 + 0.75 * (1.0 - 5.0);
+        assert!((states.q_values(0, &[0.5])[0] - expected).abs() < 1e-9);
+        assert!((states.q_values(0, &[1.5])[0] - (1.0 - 5.0)).abs() < 1e-9);
+    }
 }

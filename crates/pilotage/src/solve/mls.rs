@@ -55,7 +55,7 @@ impl Planner for Mls {
 
 /// The policy of the underlying decision process ([`super::mdp`]), asked at the most likely state.
 #[derive(Debug)]
-pub struct MostLikelyState {
+pub(crate) struct MostLikelyState {
     mdp: StateMdp,
 }
 
@@ -64,7 +64,7 @@ impl MostLikelyState {
     ///
     /// # Errors
     /// As [`StateMdp::solve`].
-    pub fn solve(
+    pub(crate) fn solve(
         belief_mdp: &BeliefMdp,
         settings: &Settings,
         observer: &dyn Progress,
@@ -74,12 +74,12 @@ impl MostLikelyState {
     }
 
     /// Whether value iteration converged.
-    pub fn converged(&self) -> bool {
+    pub(crate) fn converged(&self) -> bool {
         self.mdp.converged
     }
 
     /// The state that is most probable at a belief, length `n`.
-    pub fn most_likely(&self, belief: &Belief) -> Vec<f64> {
+    pub(crate) fn most_likely(&self, belief: &Belief) -> Vec<f64> {
         let points = match self.mdp.space() {
             Space::Grid(_) => None,
             Space::Points(_) => self

@@ -61,7 +61,7 @@ impl Planner for Qmdp {
 
 /// The policy that is greedy in `Q_MDP`.
 #[derive(Debug)]
-pub struct QmdpPolicy {
+pub(crate) struct QmdpPolicy {
     mdp: StateMdp,
     /// `E F(s, a)` for a belief centred on each grid point, by mode, level and action; none where the states are points.
     averaged: Vec<Vec<f64>>,
@@ -73,7 +73,7 @@ impl QmdpPolicy {
     ///
     /// # Errors
     /// As [`StateMdp::solve`].
-    pub fn solve(
+    pub(crate) fn solve(
         belief_mdp: &BeliefMdp,
         settings: &Settings,
         observer: &dyn Progress,
@@ -98,12 +98,12 @@ impl QmdpPolicy {
     }
 
     /// Whether value iteration converged.
-    pub fn converged(&self) -> bool {
+    pub(crate) fn converged(&self) -> bool {
         self.mdp.converged
     }
 
     /// `Q_MDP(b, a)` of every action.
-    pub fn q_values(&self, belief: &Belief) -> Vec<f64> {
+    pub(crate) fn q_values(&self, belief: &Belief) -> Vec<f64> {
         let belief_mdp = self.mdp.belief_mdp();
         let actions = belief_mdp.model().actions.len();
         let average = |action: ActionId| match self.mdp.space() {

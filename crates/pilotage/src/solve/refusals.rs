@@ -3,7 +3,7 @@
 use crate::model::{Interval, Model, When};
 
 /// Those that maximise reward need some.
-pub fn nothing_paid(model: &Model) -> Option<String> {
+pub(super) fn nothing_paid(model: &Model) -> Option<String> {
     let pays = !model.rewards.is_empty()
         || !model.events.is_empty()
         || model.episode.failure_reward != 0.0
@@ -12,7 +12,7 @@ pub fn nothing_paid(model: &Model) -> Option<String> {
 }
 
 /// Sums without end need a discount.
-pub fn reward_missing(model: &Model) -> Option<String> {
+pub(super) fn reward_missing(model: &Model) -> Option<String> {
     if let Some(reason) = nothing_paid(model) {
         return Some(reason);
     }
@@ -23,7 +23,7 @@ pub fn reward_missing(model: &Model) -> Option<String> {
 }
 
 /// Some solvers pay by `r(s, a)` only.
-pub fn pays_afterwards(model: &Model) -> Option<String> {
+pub(super) fn pays_afterwards(model: &Model) -> Option<String> {
     let rewards = model.rewards.iter().map(|reward| reward.when);
     let mut asked = rewards.chain(model.events.iter().map(|event| event.when));
     asked.any(|when| when == When::After).then(|| {
@@ -32,7 +32,7 @@ pub fn pays_afterwards(model: &Model) -> Option<String> {
 }
 
 /// Values of true states do not tell the step.
-pub fn changes(model: &Model) -> Option<String> {
+pub(super) fn changes(model: &Model) -> Option<String> {
     let clock = model.clock();
     (clock > 0).then(|| {
         format!("what it pays or changes, or how it moves or is sensed, depends on the step of the episode up to step {clock}, and this solver's values do not; use value-iteration")
@@ -40,7 +40,7 @@ pub fn changes(model: &Model) -> Option<String> {
 }
 
 /// Some solvers know one motion, one sensor, and readings that always come.
-pub fn steps_differ(model: &Model) -> Option<String> {
+pub(super) fn steps_differ(model: &Model) -> Option<String> {
     if let Some(phase) = model.later.first() {
         return Some(format!(
             "how it moves or is sensed changes at step {} ([[later]]), and this solver knows one motion and one sensor; use value-iteration",
@@ -53,7 +53,7 @@ pub fn steps_differ(model: &Model) -> Option<String> {
 }
 
 /// Planners on a grid need to know where to put it.
-pub fn bound_missing(model: &Model) -> Option<String> {
+pub(super) fn bound_missing(model: &Model) -> Option<String> {
     let unbounded = model
         .state
         .iter()

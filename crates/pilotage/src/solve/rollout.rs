@@ -31,12 +31,12 @@ const MOST_DECISIONS: usize = 10_000_000;
 ///
 /// # Errors
 /// [`crate::Error::Setting`] for none, or too many to keep what they meet.
-pub fn check_runs(setting: &'static str, runs: usize) -> Result<()> {
+pub(crate) fn check_runs(setting: &'static str, runs: usize) -> Result<()> {
     let fits = (1..=MOST_RUNS).contains(&runs);
     ensure(setting, runs, fits, "1 to 1000000")
 }
 
-/// Runs `episodes` episodes, of which [`check_runs`] is content, in the world that the model assumes and returns the decisions of each.
+/// Runs `episodes` episodes, one to a million, in the world that the model assumes and returns the decisions of each.
 /// The same for any number of threads.
 ///
 /// Episodes that are very long are cut, all at the same step, so that no more than ten million decisions are kept.

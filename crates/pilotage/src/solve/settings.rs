@@ -109,7 +109,7 @@ fn no_value<S: Settings>(name: &str, value: &str) -> Error {
 ///
 /// # Errors
 /// [`Error::Setting`] with the value and the range.
-pub fn ensure(
+pub(super) fn ensure(
     setting: &'static str,
     value: impl ToString,
     fits: bool,
@@ -126,22 +126,27 @@ pub fn ensure(
 }
 
 /// Most of a count, and how that is said. Products of two of them are still numbers.
-pub type Most = (usize, &'static str);
+pub(super) type Most = (usize, &'static str);
 
 /// Steps and what is counted in them: no run comes to an end of more.
-pub const MANY: Most = (1_000_000_000, "at most 1000000000");
+pub(super) const MANY: Most = (1_000_000_000, "at most 1000000000");
 
 /// What is kept in memory, one by one.
-pub const KEPT: Most = (1_000_000, "at most 1000000");
+pub(super) const KEPT: Most = (1_000_000, "at most 1000000");
 
 /// What is kept in pairs.
-pub const PAIRED: Most = (10_000, "at most 10000");
+pub(super) const PAIRED: Most = (10_000, "at most 10000");
 
 /// Refuses a count that is out of its range.
 ///
 /// # Errors
 /// [`Error::Setting`] with the value and the range.
-pub fn ensure_count(setting: &'static str, value: usize, least: usize, most: Most) -> Result<()> {
+pub(super) fn ensure_count(
+    setting: &'static str,
+    value: usize,
+    least: usize,
+    most: Most,
+) -> Result<()> {
     let range = match least {
         0 => "at least 0",
         1 => "at least 1",

@@ -1,6 +1,6 @@
 //! What a solver hands over, in the form asked for.
 
-use super::lqg;
+use super::lqg::LqgController;
 use crate::belief::Filter;
 use crate::error::{Error, Result};
 use crate::model::suggest;
@@ -105,7 +105,7 @@ pub enum Solved {
     /// A finite automaton, with its filter inside.
     Automaton(Automaton),
     /// A feedback on the mean that gives a free control, with its filter inside.
-    Control(lqg::LqgController),
+    Control(LqgController),
     /// A rule that is asked at every belief, and the filter that keeps the belief.
     Rule {
         /// The rule.
@@ -146,7 +146,7 @@ impl Solution {
     /// Runs the policy in the scenario's world, by the standard of [`crate::simulate`].
     ///
     /// # Errors
-    /// As [`lqg::LqgController::evaluate`], for a free control.
+    /// As [`LqgController::evaluate`], for a free control.
     pub fn evaluate(
         &self,
         scenario: &Scenario,

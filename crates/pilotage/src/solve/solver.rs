@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::lqg;
+use super::lqg::LqgController;
 use super::{Form, Learning};
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
@@ -217,7 +217,7 @@ pub enum Found {
     /// An automaton.
     Automaton(Automaton),
     /// A feedback on the mean that gives a free control.
-    Control(lqg::LqgController),
+    Control(LqgController),
 }
 
 impl Plan {
@@ -267,7 +267,7 @@ pub struct Lesson {
 }
 
 /// Refuses a model, with the reason and what would do.
-pub fn refuse(solver: &'static str, model: &Model, reason: impl Into<String>) -> Error {
+pub(super) fn refuse(solver: &'static str, model: &Model, reason: impl Into<String>) -> Error {
     Error::Unsupported {
         solver,
         model: model.name.clone(),
@@ -279,6 +279,6 @@ pub fn refuse(solver: &'static str, model: &Model, reason: impl Into<String>) ->
 ///
 /// # Errors
 /// [`Error::Unsupported`].
-pub fn refuse_if(solver: &'static str, model: &Model, reason: Option<String>) -> Result<()> {
+pub(super) fn refuse_if(solver: &'static str, model: &Model, reason: Option<String>) -> Result<()> {
     reason.map_or(Ok(()), |reason| Err(refuse(solver, model, reason)))
 }

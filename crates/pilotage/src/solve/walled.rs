@@ -17,7 +17,7 @@ const STEP: f64 = 0.5;
 
 /// Where the steps from every point of a grid end.
 #[derive(Debug, Clone)]
-pub struct WalledSmoother {
+pub(crate) struct WalledSmoother {
     weights: Vec<f64>,
     /// By grid point, then node: coordinates of the end.
     ends: Vec<Vec<f64>>,
@@ -25,13 +25,13 @@ pub struct WalledSmoother {
 
 impl WalledSmoother {
     /// Bytes it takes for a grid of so many points in `n` variables.
-    pub fn bytes(points: u64, n: usize) -> u64 {
+    pub(crate) fn bytes(points: u64, n: usize) -> u64 {
         let nodes = (2 * HALF as u64 + 1).saturating_pow(n as u32);
         points.saturating_mul(nodes).saturating_mul(8 * n as u64)
     }
 
     /// The average over N(0, covariance), `n x n`, with the walls that the belief knows of.
-    pub fn new(mdp: &BeliefMdp, grid: &Grid, covariance: &DMatrix<f64>) -> Self {
+    pub(crate) fn new(mdp: &BeliefMdp, grid: &Grid, covariance: &DMatrix<f64>) -> Self {
         let (offsets, weights) = quadrature(&square_root(covariance));
         let ends = parallel::map(grid.len(), |point| {
             let from = mdp.confine(grid.point(point).into());
@@ -45,7 +45,7 @@ impl WalledSmoother {
     }
 
     /// Applies the average to `values`, which has [`Grid::len`] entries.
-    pub fn apply(&self, grid: &Grid, values: &[f64]) -> Vec<f64> {
+    pub(crate) fn apply(&self, grid: &Grid, values: &[f64]) -> Vec<f64> {
         let n = grid.axes().len();
         parallel::map(grid.len(), |point| {
             self.ends[point]

@@ -17,7 +17,7 @@ pub(super) struct CartAndPole {
 }
 
 impl CartAndPole {
-    pub fn new(scenario: &Scenario, parameters: &CartPole) -> Self {
+    pub(crate) fn new(scenario: &Scenario, parameters: &CartPole) -> Self {
         let actions = scenario.model.actions.iter();
         Self {
             plant: Plant::new(parameters.clone()),
@@ -42,18 +42,18 @@ impl Body for CartAndPole {
 
 /// The plant. State: cart position m, velocity m/s, angle of the pole from upright rad, angular velocity rad/s.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plant {
+pub(crate) struct Plant {
     parameters: CartPole,
 }
 
 impl Plant {
     /// The plant with these parameters.
-    pub fn new(parameters: CartPole) -> Self {
+    pub(crate) fn new(parameters: CartPole) -> Self {
         Self { parameters }
     }
 
     /// Moves the state on by one time step under a constant force (N), by the classical Runge-Kutta method.
-    pub fn advance(&self, state: &mut [f64], force: f64) {
+    pub(crate) fn advance(&self, state: &mut [f64], force: f64) {
         let h = self.parameters.step;
         let s = [state[0], state[1], state[2], state[3]];
         let at = |slope: &[f64; 4], time: f64| std::array::from_fn(|i| s[i] + time * slope[i]);

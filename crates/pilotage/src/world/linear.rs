@@ -16,7 +16,7 @@ pub(super) struct LinearSensor {
 }
 
 impl LinearSensor {
-    pub fn new(scenario: &Scenario) -> Self {
+    pub(super) fn new(scenario: &Scenario) -> Self {
         let model = &scenario.model;
         let actions = 0..model.actions.len();
         let h = |step| model.sensor_at(step).h.transpose().as_slice().to_vec();
@@ -30,7 +30,13 @@ impl LinearSensor {
         }
     }
 
-    pub fn sense(&self, doing: Doing, state: &[f64], observation: &mut [f64], rng: &mut Rng) {
+    pub(super) fn sense(
+        &self,
+        doing: Doing,
+        state: &[f64],
+        observation: &mut [f64],
+        rng: &mut Rng,
+    ) {
         let rows = self.h[doing.phase].chunks_exact(state.len());
         for (reading, row) in observation.iter_mut().zip(rows) {
             *reading = row.iter().zip(state).map(|(h, s)| h * s).sum();
@@ -58,7 +64,7 @@ struct LinearMotion {
 }
 
 impl Linear {
-    pub fn new(scenario: &Scenario) -> Self {
+    pub(super) fn new(scenario: &Scenario) -> Self {
         let phases = scenario.model.phases();
         Self {
             motions: phases

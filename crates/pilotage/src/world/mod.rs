@@ -1,7 +1,8 @@
 //! What is true: worlds an agent acts in. The agent never looks inside.
 //!
-//! A [`ProblemWorld`] is the world of a scenario. What moves and senses in it is a body, of which there is a file for each simulator;
-//! what that pays and changes is said by the model's effects.
+//! A [`World`] takes an action, pays, and writes what is then sensed to an [`Observation`]; its draws come from [`Streams`], so that the
+//! same seed gives the same episode. A [`ProblemWorld`] is the world of a scenario. What moves and senses in it is a body, of which there
+//! is a file for each simulator; what that pays and changes is said by the model's effects.
 
 mod cart_pole;
 mod linear;
@@ -10,11 +11,9 @@ mod observation;
 mod problem;
 mod robot;
 
-pub use cart_pole::Plant;
-pub use noise::Noise;
+pub(crate) use noise::Noise;
 pub use observation::Observation;
 pub use problem::ProblemWorld;
-pub use robot::RobotArena;
 
 use crate::model::{ActionId, ModeId, Then};
 use crate::random::{Rng, Role, stream};

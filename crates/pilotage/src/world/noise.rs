@@ -7,7 +7,7 @@ use crate::random::{Rng, normal};
 
 /// N(0, covariance).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Noise {
+pub(crate) struct Noise {
     dim: usize,
     /// Columns of a square root of the covariance, one after the other.
     columns: Vec<f64>,
@@ -15,7 +15,7 @@ pub struct Noise {
 
 impl Noise {
     /// Noise of the given covariance, positive semi-definite.
-    pub fn new(covariance: &DMatrix<f64>) -> Self {
+    pub(crate) fn new(covariance: &DMatrix<f64>) -> Self {
         Self {
             dim: covariance.nrows(),
             columns: square_root(covariance).as_slice().to_vec(),
@@ -23,7 +23,7 @@ impl Noise {
     }
 
     /// Adds one draw to `target`, which has the covariance's size.
-    pub fn add_to(&self, target: &mut [f64], rng: &mut Rng) {
+    pub(crate) fn add_to(&self, target: &mut [f64], rng: &mut Rng) {
         for column in self.columns.chunks_exact(self.dim) {
             let draw = normal(rng);
             for (value, factor) in target.iter_mut().zip(column) {

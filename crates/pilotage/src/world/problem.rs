@@ -65,7 +65,7 @@ impl ProblemWorld {
     }
 
     /// Which of the true start hypotheses the last [`World::reset`] drew.
-    pub fn hypothesis(&self) -> usize {
+    pub(crate) fn hypothesis(&self) -> usize {
         self.hypothesis
     }
 

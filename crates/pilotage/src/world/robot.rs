@@ -27,7 +27,7 @@ pub(super) struct Driven {
 }
 
 impl Driven {
-    pub fn new(scenario: &Scenario, robot: &Robot) -> Self {
+    pub(crate) fn new(scenario: &Scenario, robot: &Robot) -> Self {
         let model = &scenario.model;
         let actions = 0..model.actions.len();
         Self {
@@ -56,7 +56,7 @@ impl Body for Driven {
 
 /// The robot in its arena.
 #[derive(Debug, Clone)]
-pub struct RobotArena {
+pub(crate) struct RobotArena {
     robot: Robot,
     /// Extent east and north, m.
     arena: [f64; 2],
@@ -70,7 +70,7 @@ pub struct RobotArena {
 
 impl RobotArena {
     /// The robot of a model, in the middle of its arena, facing east.
-    pub fn new(robot: &Robot, model: &Model) -> Self {
+    pub(crate) fn new(robot: &Robot, model: &Model) -> Self {
         let arena = robot.arena(model);
         Self {
             robot: robot.clone(),
@@ -86,7 +86,7 @@ impl RobotArena {
     }
 
     /// Puts the robot down facing east, as near to a state (length `n`) as walls allow, and writes where that is.
-    pub fn put(&mut self, state: &mut [f64]) {
+    pub(crate) fn put(&mut self, state: &mut [f64]) {
         self.place = self.arena.map(|width| 0.5 * width);
         for (i, (x, low)) in state.iter().zip(&self.low).enumerate() {
             self.place[i] = (x - low) * self.robot.cell;
@@ -97,7 +97,7 @@ impl RobotArena {
     }
 
     /// Carries out a displacement in units of state (length `n`) and writes the state reached.
-    pub fn carry_out(&mut self, displacement: &[f64], state: &mut [f64], rng: &mut Rng) {
+    pub(crate) fn carry_out(&mut self, displacement: &[f64], state: &mut [f64], rng: &mut Rng) {
         let along = |i: usize| displacement.get(i).map_or(0.0, |d| d * self.robot.cell);
         let (east, north) = (along(0), along(1));
         let distance = east.hypot(north);
@@ -181,7 +181,7 @@ impl RobotArena {
 
     /// Writes where the robot takes itself to be along every variable (length `n`): the mean of what the finders that look along it
     /// say, a wall being in sight of at least one.
-    pub fn sense(&self, observation: &mut [f64], rng: &mut Rng) {
+    pub(crate) fn sense(&self, observation: &mut [f64], rng: &mut Rng) {
         let mut sums = [[0.0; 2]; 2];
         let compass = self.heading + self.robot.compass_noise * normal(rng);
         for side in 0..4 {

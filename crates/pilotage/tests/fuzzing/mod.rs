@@ -15,7 +15,7 @@ use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{TrackingAgent, run_episode};
 use pilotage::solve::compile::{self, compile};
-use pilotage::solve::{Registry, Run, arkaq, grid, kafaq, value_iteration};
+use pilotage::solve::{Registry, Run, arkaq, kafaq, value_iteration};
 use pilotage::world::{Observation, ProblemWorld, Streams, World};
 
 pub use mutate::numbers;
@@ -158,7 +158,7 @@ fn run(scenario: &Scenario, mdp: &BeliefMdp) {
 fn policies() -> Reader {
     let planned = |name: &str, matching| {
         let mdp = BeliefMdp::new(&built_in(name));
-        let grid = grid::Settings {
+        let grid = value_iteration::Settings {
             points: Some(41),
             tolerance: 1e-3,
             ..Default::default()

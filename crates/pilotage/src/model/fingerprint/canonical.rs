@@ -14,14 +14,19 @@ pub(crate) trait Canonical {
 pub(crate) struct Fields<'a>(pub &'a mut Digest);
 
 impl Fields<'_> {
-    pub fn field(self, name: &str, value: &(impl Canonical + ?Sized)) -> Self {
+    pub(crate) fn field(self, name: &str, value: &(impl Canonical + ?Sized)) -> Self {
         name.write(self.0);
         value.write(self.0);
         self
     }
 
     /// A field that is left out where it has its default.
-    pub fn unless<T: Canonical + PartialEq>(self, default: &T, name: &str, value: &T) -> Self {
+    pub(crate) fn unless<T: Canonical + PartialEq>(
+        self,
+        default: &T,
+        name: &str,
+        value: &T,
+    ) -> Self {
         if value == default {
             return self;
         }
@@ -29,7 +34,7 @@ impl Fields<'_> {
     }
 
     /// A field that is left out where there is none.
-    pub fn given<T: Canonical>(self, name: &str, value: Option<&T>) -> Self {
+    pub(crate) fn given<T: Canonical>(self, name: &str, value: Option<&T>) -> Self {
         match value {
             Some(value) => self.field(name, value),
             None => self,
@@ -37,14 +42,14 @@ impl Fields<'_> {
     }
 
     /// A list that is left out where it is empty.
-    pub fn list<T: Canonical>(self, name: &str, list: &[T]) -> Self {
+    pub(crate) fn list<T: Canonical>(self, name: &str, list: &[T]) -> Self {
         if list.is_empty() {
             return self;
         }
         self.field(name, list)
     }
 
-    pub fn end(self) {
+    pub(crate) fn end(self) {
         "".write(self.0);
     }
 }

@@ -16,17 +16,17 @@ pub(super) struct Coding<'a> {
 }
 
 impl<'a> Coding<'a> {
-    pub fn new(model: &'a Model) -> Self {
+    pub(super) fn new(model: &'a Model) -> Self {
         Self { model }
     }
 
     /// Length of an input.
-    pub fn length(&self) -> usize {
+    pub(super) fn length(&self) -> usize {
         2 * self.model.state.len() + 1
     }
 
     /// The input of a mean that was notably rewarded, or was not.
-    pub fn input(&self, mean: &[f64], event: bool) -> Vec<f64> {
+    pub(super) fn input(&self, mean: &[f64], event: bool) -> Vec<f64> {
         let variables = self.model.state.iter().zip(mean);
         let place: Vec<f64> = variables
             .map(|(variable, m)| scaled(&variable.bounds, *m))
@@ -41,7 +41,7 @@ impl<'a> Coding<'a> {
     }
 
     /// The clusters with these centres.
-    pub fn clusters(&self, centres: &[Vec<f64>]) -> Clusters {
+    pub(super) fn clusters(&self, centres: &[Vec<f64>]) -> Clusters {
         let place = |centre: &Vec<f64>| {
             let variables = self.model.state.iter().zip(centre);
             let places = variables.map(|(variable, x)| {
@@ -53,7 +53,7 @@ impl<'a> Coding<'a> {
     }
 
     /// By cluster: how much of it was rewarded.
-    pub fn rewarded(&self, centres: &[Vec<f64>]) -> Vec<f64> {
+    pub(super) fn rewarded(&self, centres: &[Vec<f64>]) -> Vec<f64> {
         let rewarded = centres.iter().map(|centre| centre[self.length() - 1]);
         rewarded.collect()
     }

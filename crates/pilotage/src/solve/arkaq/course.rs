@@ -16,7 +16,7 @@ use crate::solve::learn::{Course, Experience, Owner, critical, fitting, undiscou
 
 /// All that a run has to remember between two pieces of work.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct State {
+pub(super) struct State {
     experience: Experience,
     curve: Vec<Point>,
     /// Vigilances that are done with.

@@ -25,7 +25,7 @@ pub(super) struct DraftNode {
 
 impl Draft {
     /// Whether it is one that a task can have.
-    pub fn fits(&self, task: &Task<'_>) -> bool {
+    pub(super) fn fits(&self, task: &Task<'_>) -> bool {
         let (actions, depth) = (task.actions(), task.settings.depth);
         let clusters = self.recall.clusters().len();
         let node =
@@ -35,7 +35,7 @@ impl Draft {
     }
 
     /// The same with some nodes put for others: `into` says by node which one, itself if it stays.
-    pub fn merged(&self, into: &[ModeId]) -> Self {
+    pub(super) fn merged(&self, into: &[ModeId]) -> Self {
         let nodes = self.nodes.iter().enumerate();
         let kept = nodes.filter(|(id, _)| into[*id] == *id);
         Self {
@@ -45,7 +45,7 @@ impl Draft {
     }
 
     /// How far two nodes are from each other.
-    pub fn apart(&self, a: usize, b: usize) -> f64 {
+    pub(super) fn apart(&self, a: usize, b: usize) -> f64 {
         let clusters = self.recall.clusters();
         self.nodes[a]
             .history
@@ -53,7 +53,7 @@ impl Draft {
     }
 
     /// The automaton that a controller runs. What its filter recalls are its modes, with one node each.
-    pub fn compile(&self, task: &Task<'_>) -> Automaton {
+    pub(super) fn compile(&self, task: &Task<'_>) -> Automaton {
         let mut automaton = Automaton::new(&task.mdp, SOLVER, Matching::Nearest);
         automaton.fingerprint = task.fingerprint;
         let model = task.mdp.model();

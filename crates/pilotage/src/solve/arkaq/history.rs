@@ -10,7 +10,7 @@ use crate::model::{ActionId, ModeId};
 
 /// A cluster and the steps that led to it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct History {
+pub(super) struct History {
     /// The cluster the belief is in.
     pub cluster: ClusterId,
     /// The last steps, the very last one first: the action, and the cluster it was taken in. Shorter soon after the start of an episode.
@@ -19,7 +19,7 @@ pub struct History {
 
 impl History {
     /// That of an episode that starts in a cluster.
-    pub fn start(cluster: ClusterId) -> Self {
+    pub(super) fn start(cluster: ClusterId) -> Self {
         Self {
             cluster,
             past: Vec::new(),
@@ -27,7 +27,7 @@ impl History {
     }
 
     /// The history after an action that led to a cluster, of which `depth` steps are remembered.
-    pub fn then(&self, action: ActionId, cluster: ClusterId, depth: usize) -> Self {
+    pub(super) fn then(&self, action: ActionId, cluster: ClusterId, depth: usize) -> Self {
         let steps = std::iter::once((action, self.cluster)).chain(self.past.iter().copied());
         Self {
             cluster,
@@ -36,14 +36,14 @@ impl History {
     }
 
     /// Whether it is one of so many clusters and actions, and not longer than what is remembered.
-    pub fn fits(&self, clusters: usize, actions: usize, depth: usize) -> bool {
+    pub(super) fn fits(&self, clusters: usize, actions: usize, depth: usize) -> bool {
         let step =
             |&(action, cluster): &(ActionId, ClusterId)| action < actions && cluster < clusters;
         self.cluster < clusters && self.past.len() <= depth && self.past.iter().all(step)
     }
 
     /// In words.
-    pub fn name(&self, actions: &[String]) -> String {
+    pub(super) fn name(&self, actions: &[String]) -> String {
         let mut name = format!("cluster {}", self.cluster);
         for (action, from) in &self.past {
             name += &format!(", {} from {from}", actions[*action]);
@@ -52,7 +52,7 @@ impl History {
     }
 
     /// How far it is from another: squared distances of the clusters, and 1 for every step by another action or that one of them lacks.
-    pub fn apart(&self, other: &Self, clusters: &Clusters) -> f64 {
+    pub(super) fn apart(&self, other: &Self, clusters: &Clusters) -> f64 {
         let steps = self.past.iter().zip(&other.past).map(|(a, b)| {
             let action = f64::from(u8::from(a.0 != b.0));
             action + clusters.between(a.1, b.1)
@@ -84,7 +84,7 @@ pub(super) struct Histories {
 
 impl Histories {
     /// None, of so many clusters.
-    pub fn new(clusters: usize, depth: usize, limit: usize) -> Self {
+    pub(super) fn new(clusters: usize, depth: usize, limit: usize) -> Self {
         Self {
             depth,
             limit,
@@ -96,7 +96,7 @@ impl Histories {
 
     /// Takes in a history, as the network takes in an input: it is known, or it is new, or it is new and there are too many already. A
     /// place is kept for every cluster.
-    pub fn meet(&mut self, history: &History) -> Outcome {
+    pub(super) fn meet(&mut self, history: &History) -> Outcome {
         if self.number.contains_key(history) {
             return Outcome::Resonated;
         }
@@ -116,12 +116,16 @@ impl Histories {
     }
 
     /// What is remembered of a history after an action that led to a cluster.
-    pub fn after(&self, history: &History, action: ActionId, cluster: ClusterId) -> History {
+    pub(super) fn after(&self, history: &History, action: ActionId, cluster: ClusterId) -> History {
         history.then(action, cluster, self.depth)
     }
 
     /// The automaton's states and how they follow one another.
-    pub fn into_automaton(mut self, clusters: Clusters, actions: usize) -> (Vec<History>, Recall) {
+    pub(super) fn into_automaton(
+        mut self,
+        clusters: Clusters,
+        actions: usize,
+    ) -> (Vec<History>, Recall) {
         for cluster in 0..clusters.len() {
             if self.inside[cluster].is_empty() {
                 self.add(History::start(cluster));

@@ -31,7 +31,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-pub use crate::solve::Worlds;
+use crate::solve::Worlds;
 pub use curves::drawn;
 pub use settings::Settings;
 

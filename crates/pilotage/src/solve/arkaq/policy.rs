@@ -24,7 +24,7 @@ pub(super) struct Policy {
 
 impl Policy {
     /// Nothing learned yet.
-    pub fn new(task: &Task<'_>, states: usize) -> Self {
+    pub(super) fn new(task: &Task<'_>, states: usize) -> Self {
         Self {
             table: Table::new(states, task.actions()),
             best: vec![0; states],
@@ -36,7 +36,7 @@ impl Policy {
     }
 
     /// Whether it is one that a task can have, of so many states.
-    pub fn fits(&self, task: &Task<'_>, states: usize) -> bool {
+    pub(super) fn fits(&self, task: &Task<'_>, states: usize) -> bool {
         let (settings, actions) = (&task.settings, task.actions());
         self.table.fits(states, actions)
             && self.best.len() == states
@@ -48,22 +48,22 @@ impl Policy {
     }
 
     /// Whether the best actions no longer change.
-    pub fn converged(&self, task: &Task<'_>) -> bool {
+    pub(super) fn converged(&self, task: &Task<'_>) -> bool {
         self.calm >= task.settings.calm
     }
 
     /// Whether learning is over.
-    pub fn finished(&self, task: &Task<'_>) -> bool {
+    pub(super) fn finished(&self, task: &Task<'_>) -> bool {
         self.converged(task) || self.epoch >= task.settings.epoch_limit
     }
 
     /// Epochs so far.
-    pub fn epochs(&self) -> usize {
+    pub(super) fn epochs(&self) -> usize {
         self.epoch
     }
 
     /// Acts for an epoch of whole episodes; `filter` recalls the states. Returns the reward of a step.
-    pub fn run_epoch(
+    pub(super) fn run_epoch(
         &mut self,
         task: &Task<'_>,
         filter: &Filter,
@@ -138,14 +138,14 @@ impl Policy {
     }
 
     /// By state: the best action and its value.
-    pub fn choices(&self) -> Vec<(ActionId, f64)> {
+    pub(super) fn choices(&self) -> Vec<(ActionId, f64)> {
         let best = self.best.iter().enumerate();
         best.map(|(row, &action)| (action, self.table.best(row)))
             .collect()
     }
 
     /// The states with their best actions and values.
-    pub fn draft(&self, world: &WorldModel) -> Draft {
+    pub(super) fn draft(&self, world: &WorldModel) -> Draft {
         let states = world.states.iter().enumerate();
         let nodes = states.map(|(row, history)| DraftNode {
             history: history.clone(),

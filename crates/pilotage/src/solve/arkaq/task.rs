@@ -12,7 +12,7 @@ use crate::solve::learn::{Trial, Worlds, known, run_trial};
 pub(super) const SOLVER: &str = "arkaq";
 
 /// The learner's task.
-pub struct Task<'a> {
+pub(super) struct Task<'a> {
     /// What the agent assumes, without map, rewards, events and modes.
     pub(super) mdp: BeliefMdp,
     /// The filter before there are clusters.
@@ -26,7 +26,7 @@ pub struct Task<'a> {
 impl<'a> Task<'a> {
     /// The task of a model, of which only A, B, H, Q, R, the bounds, the start belief, the discount and the length of an episode are
     /// looked at.
-    pub fn new(model: &Model, settings: Settings, worlds: &'a Worlds<'a>) -> Result<Self> {
+    pub(super) fn new(model: &Model, settings: Settings, worlds: &'a Worlds<'a>) -> Result<Self> {
         settings.validate()?;
         if let Some(variable) = model.state.iter().find(|v| !v.bounds.width().is_finite()) {
             return Err(Error::Unsupported {
@@ -51,17 +51,17 @@ impl<'a> Task<'a> {
     }
 
     /// Number of actions.
-    pub fn actions(&self) -> usize {
+    pub(super) fn actions(&self) -> usize {
         self.mdp.model().actions.len()
     }
 
     /// Discount factor.
-    pub fn discount(&self) -> f64 {
+    pub(super) fn discount(&self) -> f64 {
         self.mdp.model().discount
     }
 
     /// Runs an automaton, the same episodes at every trial.
-    pub fn trial(&self, automaton: &Automaton) -> Trial {
+    pub(super) fn trial(&self, automaton: &Automaton) -> Trial {
         let Settings { trial, seed, .. } = self.settings;
         run_trial(self.mdp.model(), self.worlds, automaton, trial, seed)
     }

@@ -32,7 +32,7 @@ pub(super) struct WorldModel {
 
 impl WorldModel {
     /// Whether it is one that a task can have.
-    pub fn fits(&self, task: &Task<'_>) -> bool {
+    pub(super) fn fits(&self, task: &Task<'_>) -> bool {
         let (actions, depth) = (task.actions(), task.settings.depth);
         let clusters = self.recall.clusters().len();
         let state = |state: &History| state.fits(clusters, actions, depth);
@@ -45,7 +45,7 @@ impl WorldModel {
     }
 
     /// How exploration ended, in a sentence.
-    pub fn describe(&self) -> String {
+    pub(super) fn describe(&self) -> String {
         let (vigilance, clusters) = (self.vigilance, self.recall.clusters().len());
         let states = self.states.len();
         if self.capped {
@@ -59,7 +59,7 @@ impl WorldModel {
     }
 
     /// The clusters, as a result tells of them.
-    pub fn clusters(&self) -> Vec<ClusterFound> {
+    pub(super) fn clusters(&self) -> Vec<ClusterFound> {
         let centres = self.recall.clusters().centres().iter();
         centres
             .zip(self.rewarded.iter().zip(&self.founded))

@@ -19,7 +19,7 @@ pub(super) struct Ceiling {
 }
 
 impl Ceiling {
-    pub fn new(model: &Model) -> Self {
+    pub(super) fn new(model: &Model) -> Self {
         let mut ceiling = Self {
             discount: model.discount,
             going_on: f64::NEG_INFINITY,
@@ -94,12 +94,12 @@ impl Ceiling {
     }
 
     /// The most for one step more than those that can bring `less`.
-    pub fn one_more(&self, less: f64) -> f64 {
+    pub(super) fn one_more(&self, less: f64) -> f64 {
         self.ending.max(self.going_on + self.discount * less)
     }
 
     /// The most within so many steps.
-    pub fn within(&self, steps: usize) -> f64 {
+    pub(super) fn within(&self, steps: usize) -> f64 {
         let (mut most, mut rise) = (0.0, 0.0);
         for _ in 0..steps.min(MOST_SWEEPS) {
             let next = self.one_more(most);

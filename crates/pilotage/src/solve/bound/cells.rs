@@ -28,7 +28,7 @@ impl Cells {
     ///
     /// # Errors
     /// Where noise-free actions never come back to a finite set of places.
-    pub fn new(frame: &Frame, axis: usize, count: usize) -> Result<Self, String> {
+    pub(super) fn new(frame: &Frame, axis: usize, count: usize) -> Result<Self, String> {
         if !frame.is_real(axis) {
             return Ok(Self {
                 ends: vec![-0.5, 0.5],
@@ -109,22 +109,22 @@ impl Cells {
         })
     }
 
-    pub fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.ends.len() - 1 + usize::from(self.open[0]) + usize::from(self.open[1])
     }
 
     /// Width of the widest cells where it matters.
-    pub fn resolution(&self) -> f64 {
+    pub(super) fn resolution(&self) -> f64 {
         self.resolution
     }
 
     /// Number of ends of all cells.
-    pub fn places(&self) -> usize {
+    pub(super) fn places(&self) -> usize {
         2 * self.count()
     }
 
     /// The side on which a cell is open.
-    pub fn open_side(&self, cell: usize) -> Option<usize> {
+    pub(super) fn open_side(&self, cell: usize) -> Option<usize> {
         match (self.open, cell) {
             ([true, _], 0) => Some(0),
             ([_, true], cell) if cell + 1 == self.count() => Some(1),
@@ -133,7 +133,7 @@ impl Cells {
     }
 
     /// Where the open cell on a side begins.
-    pub fn outer_end(&self, side: usize) -> f64 {
+    pub(super) fn outer_end(&self, side: usize) -> f64 {
         match side {
             0 => self.ends[0],
             _ => self.ends[self.ends.len() - 1],
@@ -141,13 +141,13 @@ impl Cells {
     }
 
     /// Both ends of a cell that is not open.
-    pub fn span(&self, cell: usize) -> (f64, f64) {
+    pub(super) fn span(&self, cell: usize) -> (f64, f64) {
         let first = cell - usize::from(self.open[0]);
         (self.ends[first], self.ends[first + 1])
     }
 
     /// A coordinate inside a cell.
-    pub fn inside(&self, cell: usize) -> f64 {
+    pub(super) fn inside(&self, cell: usize) -> f64 {
         let away = |end: f64| end.abs().max(1.0);
         match self.open_side(cell) {
             Some(0) => self.ends[0] - away(self.ends[0]),
@@ -161,7 +161,7 @@ impl Cells {
 
     /// Weights of all ends of cells in the expectation of a function that is linear in every cell. What would be beyond a wall stops
     /// at it, or is left out.
-    pub fn weights(&self, law: &Law, with_stopped: bool) -> Vec<f64> {
+    pub(super) fn weights(&self, law: &Law, with_stopped: bool) -> Vec<f64> {
         let mut weights = vec![0.0; self.places()];
         let first = usize::from(self.open[0]);
         let ends: Vec<(f64, f64)> = self
@@ -191,7 +191,7 @@ impl Cells {
     ///
     /// # Errors
     /// Where it would take the cell apart.
-    pub fn shifted(&self, cell: usize, side: usize, shift: f64) -> Result<usize, String> {
+    pub(super) fn shifted(&self, cell: usize, side: usize, shift: f64) -> Result<usize, String> {
         let (low, high) = self.span(cell);
         let middle = 0.5 * (low + high) + shift;
         for end in 0..2 {
@@ -214,7 +214,7 @@ impl Cells {
     }
 
     /// The ends of the wall or of the domain, where they stop the state.
-    pub fn stops(&self) -> [Option<f64>; 2] {
+    pub(super) fn stops(&self) -> [Option<f64>; 2] {
         let at = |side: usize| (self.stops && !self.open[side]).then(|| self.outer_end(side));
         [at(0), at(1)]
     }

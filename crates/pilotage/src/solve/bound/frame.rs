@@ -50,7 +50,7 @@ pub(super) struct Start {
 impl<'a> Frame<'a> {
     /// # Errors
     /// Why the model cannot be taken apart.
-    pub fn new(model: &'a Model) -> Result<Self, String> {
+    pub(super) fn new(model: &'a Model) -> Result<Self, String> {
         let n = model.state_dim();
         if n > 2 {
             return Err(format!(
@@ -98,21 +98,21 @@ impl<'a> Frame<'a> {
     }
 
     /// Whether the axis is that of a state variable.
-    pub fn is_real(&self, axis: usize) -> bool {
+    pub(super) fn is_real(&self, axis: usize) -> bool {
         axis < self.model.state_dim()
     }
 
     /// A state of the model at two coordinates.
-    pub fn state<'b>(&self, at: &'b [f64; 2]) -> &'b [f64] {
+    pub(super) fn state<'b>(&self, at: &'b [f64; 2]) -> &'b [f64] {
         &at[..self.model.state_dim()]
     }
 
-    pub fn noise(&self, action: ActionId, axis: usize) -> Noise {
+    pub(super) fn noise(&self, action: ActionId, axis: usize) -> Noise {
         self.classes[self.class_of[action]][axis]
     }
 
     /// A stretch of an axis in which everything happens that matters: bounds, starts and, unless they are far off, regions.
-    pub fn core(&self, axis: usize) -> Interval {
+    pub(super) fn core(&self, axis: usize) -> Interval {
         let AxisModel { bounds, cuts, .. } = &self.axes[axis];
         let mut core = Interval::new(f64::INFINITY, f64::NEG_INFINITY);
         let mut hold = |x: f64| {

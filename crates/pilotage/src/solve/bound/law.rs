@@ -12,7 +12,7 @@ pub(super) struct Law {
 }
 
 impl Law {
-    pub fn normal(mean: f64, sd: f64) -> Self {
+    pub(super) fn normal(mean: f64, sd: f64) -> Self {
         Self {
             low: mean,
             high: mean,
@@ -21,7 +21,7 @@ impl Law {
     }
 
     /// Its law after `x -> a x + shift` and more noise.
-    pub fn moved(self, a: f64, shift: f64, variance: f64) -> Self {
+    pub(super) fn moved(self, a: f64, shift: f64, variance: f64) -> Self {
         let (low, high) = (a * self.low + shift, a * self.high + shift);
         Self {
             low: low.min(high),
@@ -31,7 +31,7 @@ impl Law {
     }
 
     /// `P(X < at)`.
-    pub fn below(&self, at: f64) -> f64 {
+    pub(super) fn below(&self, at: f64) -> f64 {
         if at == f64::INFINITY {
             return 1.0;
         }
@@ -50,7 +50,7 @@ impl Law {
     }
 
     /// `E max(X - at, 0)`.
-    pub fn beyond(&self, at: f64) -> f64 {
+    pub(super) fn beyond(&self, at: f64) -> f64 {
         let width = self.high - self.low;
         if width > 0.0 {
             (half_square(self.high - at, self.sd) - half_square(self.low - at, self.sd)) / width
@@ -60,7 +60,7 @@ impl Law {
     }
 
     /// Probabilities of the cells between rising `cuts`, one more than those.
-    pub fn masses(&self, cuts: &[f64]) -> Vec<f64> {
+    pub(super) fn masses(&self, cuts: &[f64]) -> Vec<f64> {
         let mut masses = Vec::with_capacity(cuts.len() + 1);
         let mut before = 0.0;
         for &cut in cuts {
@@ -73,7 +73,7 @@ impl Law {
     }
 
     /// Weights of the points of an axis in the expectation of a function that is linear between them and constant beyond them.
-    pub fn hats(&self, axis: &Axis) -> Vec<f64> {
+    pub(super) fn hats(&self, axis: &Axis) -> Vec<f64> {
         if axis.count == 1 {
             return vec![1.0];
         }

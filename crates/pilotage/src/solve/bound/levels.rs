@@ -33,7 +33,7 @@ pub(super) struct Levels {
 
 impl Levels {
     /// At most so many levels, as far as an episode of a length reaches: the closer two may be and still be two, the fewer are needed.
-    pub fn new(
+    pub(super) fn new(
         a: [f64; 2],
         classes: &[[Noise; 2]],
         starts: &[Variances],
@@ -127,7 +127,7 @@ impl Levels {
     }
 
     /// The levels that a step leads to from any of these, without the classes that no action has.
-    pub fn after(&self, from: &[usize]) -> Vec<usize> {
+    pub(super) fn after(&self, from: &[usize]) -> Vec<usize> {
         let steps = from.iter().flat_map(|&level| &self.steps[level]);
         let mut next: Vec<usize> = steps.filter_map(|step| step.next).collect();
         next.sort_unstable();
@@ -136,7 +136,7 @@ impl Levels {
     }
 
     /// Everything that can be reached from these, themselves included.
-    pub fn closure(&self, from: &[usize]) -> Vec<usize> {
+    pub(super) fn closure(&self, from: &[usize]) -> Vec<usize> {
         let mut all = from.to_vec();
         loop {
             let mut more = all.clone();

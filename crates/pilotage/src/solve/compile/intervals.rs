@@ -17,7 +17,7 @@ struct Run {
 }
 
 /// Adds the nodes of a band.
-pub fn place(automaton: &mut Automaton, policy: &dyn Policy, band: &Band) {
+pub(super) fn place(automaton: &mut Automaton, policy: &dyn Policy, band: &Band) {
     let decided = band.decisions.iter().map(|(mean, _)| mean[0]);
     let means = decided.chain(band.beside.iter().map(|mean| mean[0]));
     let (low, high) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {

@@ -6,7 +6,7 @@
 
 mod annotate;
 mod intervals;
-pub mod planes;
+pub(crate) mod planes;
 mod samples;
 
 pub use annotate::annotate;

@@ -11,11 +11,11 @@ use crate::belief::{BeliefMdp, StratumId};
 use crate::policy::{Automaton, Matching, Node, Place};
 
 /// Levels from the first to the last of which the agent does the same at the same mean.
-pub type Group = (StratumId, StratumId);
+pub(crate) type Group = (StratumId, StratumId);
 
 /// A command `u = c - K m`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Command {
+pub(crate) struct Command {
     /// `K`, `p x n`.
     pub gain: DMatrix<f64>,
     /// `c`, length `p`.
@@ -24,7 +24,7 @@ pub struct Command {
 
 /// The automaton of a command per group of levels, in units in which each state variable is divided by its `scale` (length `n`, above
 /// 0).
-pub fn automaton(
+pub(crate) fn automaton(
     mdp: &BeliefMdp,
     solver: &str,
     groups: &[Group],

@@ -7,7 +7,7 @@ use crate::policy::{Automaton, Matching, NodeId, Policy};
 
 /// Adds the nodes of a band: every belief met is learned by the automaton's own rule, over and over until nothing changes; then
 /// nodes that can go without more than the slack of wrong decisions are dropped, the least needed first.
-pub fn place(automaton: &mut Automaton, policy: &dyn Policy, band: &Band, slack: f64) {
+pub(super) fn place(automaton: &mut Automaton, policy: &dyn Policy, band: &Band, slack: f64) {
     const PASSES: usize = 8;
     let mut fresh = Automaton {
         nodes: Vec::new(),

@@ -15,7 +15,7 @@ use crate::solve::learn::{Course, Owner, fitting};
 // There is one at a time, so its size does not matter.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug, Serialize, Deserialize)]
-pub enum State {
+pub(super) enum State {
     /// By tests on evidence, epoch by epoch.
     Tested(tested::State),
     /// As in Figure 4.5, episode by episode.

@@ -40,7 +40,7 @@ pub(super) struct Edge {
 
 impl Draft {
     /// Whether it is one of a task, with this memory.
-    pub fn fits(&self, task: &Task<'_>, memory: &Memory) -> bool {
+    pub(super) fn fits(&self, task: &Task<'_>, memory: &Memory) -> bool {
         let (memories, actions) = (memory.len(), task.actions());
         let node = |node: &DraftNode| {
             node.level < task.chain.len()
@@ -64,12 +64,12 @@ impl Draft {
     }
 
     /// Whether a memory has a node at the steady level.
-    pub fn has_nodes(&self, memory: usize) -> bool {
+    pub(super) fn has_nodes(&self, memory: usize) -> bool {
         self.nodes.iter().any(|node| node.memory == memory)
     }
 
     /// The automaton that a controller runs.
-    pub fn compile(&self, task: &Task<'_>) -> Automaton {
+    pub(super) fn compile(&self, task: &Task<'_>) -> Automaton {
         let mut automaton = Automaton::new(&task.mdp, SOLVER, Matching::Segments);
         automaton.fingerprint = task.fingerprint;
         if let Some(coordinates) = &task.coordinates {

@@ -52,12 +52,12 @@ pub(super) struct Gain {
 
 impl Gain {
     /// Standard error.
-    pub fn error(&self) -> f64 {
+    pub(super) fn error(&self) -> f64 {
         self.variance.max(0.0).sqrt()
     }
 
     /// Lower confidence limit, `z` standard errors below.
-    pub fn surely(&self, z: f64) -> f64 {
+    pub(super) fn surely(&self, z: f64) -> f64 {
         self.sum - z * self.error()
     }
 }
@@ -71,7 +71,7 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    pub fn new(cells: usize, actions: usize) -> Self {
+    pub(super) fn new(cells: usize, actions: usize) -> Self {
         Self {
             actions,
             targets: vec![Sample::default(); cells * actions],
@@ -105,28 +105,28 @@ impl Evidence {
         self.visits.iter_mut().for_each(|visits| *visits *= factor);
     }
 
-    pub fn actions(&self) -> usize {
+    pub(super) fn actions(&self) -> usize {
         self.actions
     }
 
     /// Visits of a cell.
-    pub fn visits(&self, cell: usize) -> f64 {
+    pub(super) fn visits(&self, cell: usize) -> f64 {
         self.visits[cell]
     }
 
     /// Visits of all cells.
-    pub fn total(&self) -> f64 {
+    pub(super) fn total(&self) -> f64 {
         self.visits.iter().sum()
     }
 
     /// Mean target of an action in a cell, where there are enough.
-    pub fn mean(&self, cell: usize, action: ActionId) -> Option<f64> {
+    pub(super) fn mean(&self, cell: usize, action: ActionId) -> Option<f64> {
         let sample = &self.targets[cell * self.actions + action];
         (sample.count >= ENOUGH).then(|| sample.mean())
     }
 
     /// What taking `new` for `old` in a cell gains over all visits there. Nothing is claimed without enough targets of both.
-    pub fn gain(&self, cell: usize, new: ActionId, old: ActionId) -> Gain {
+    pub(super) fn gain(&self, cell: usize, new: ActionId, old: ActionId) -> Gain {
         let [better, worse] = [new, old].map(|action| &self.targets[cell * self.actions + action]);
         if new == old || better.count < ENOUGH || worse.count < ENOUGH {
             return Gain::default();
@@ -139,7 +139,7 @@ impl Evidence {
     }
 
     /// What one assignment of actions to cells gains over another.
-    pub fn compare(&self, new: &[ActionId], old: &[ActionId]) -> Gain {
+    pub(super) fn compare(&self, new: &[ActionId], old: &[ActionId]) -> Gain {
         let changed = (0..new.len()).filter(|&cell| new[cell] != old[cell]);
         changed.fold(Gain::default(), |total, cell| {
             let gain = self.gain(cell, new[cell], old[cell]);
@@ -160,7 +160,7 @@ pub(super) struct Halves {
 }
 
 impl Halves {
-    pub fn new(cells: usize, actions: usize) -> Self {
+    pub(super) fn new(cells: usize, actions: usize) -> Self {
         let none = Evidence::new(cells, actions);
         Self {
             all: none.clone(),
@@ -169,19 +169,19 @@ impl Halves {
     }
 
     /// Whether it is evidence of so many cells and actions.
-    pub fn fits(&self, cells: usize, actions: usize) -> bool {
+    pub(super) fn fits(&self, cells: usize, actions: usize) -> bool {
         let [first, second] = &self.half;
         [&self.all, first, second]
             .iter()
             .all(|evidence| evidence.fits(cells, actions))
     }
 
-    pub fn add(&mut self, coin: bool, cell: usize, action: ActionId, target: f64) {
+    pub(super) fn add(&mut self, coin: bool, cell: usize, action: ActionId, target: f64) {
         self.all.add(cell, action, target);
         self.half[usize::from(coin)].add(cell, action, target);
     }
 
-    pub fn fade(&mut self, factor: f64) {
+    pub(super) fn fade(&mut self, factor: f64) {
         let [first, second] = &mut self.half;
         for evidence in [&mut self.all, first, second] {
             evidence.fade(factor);

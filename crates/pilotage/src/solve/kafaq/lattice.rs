@@ -43,7 +43,7 @@ pub(super) fn boxes_needed(bounds: &[Interval], side: &[f64]) -> f64 {
 
 impl Lattice {
     /// Cells of at most the given sides over finite bounds.
-    pub fn new(bounds: &[Interval], side: &[f64]) -> Self {
+    pub(super) fn new(bounds: &[Interval], side: &[f64]) -> Self {
         let counts: Vec<usize> = bounds
             .iter()
             .zip(side)
@@ -90,22 +90,22 @@ impl Lattice {
     }
 
     /// Number of cells.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.counts.iter().product()
     }
 
     /// Cells along a variable.
-    pub fn count(&self, variable: usize) -> usize {
+    pub(super) fn count(&self, variable: usize) -> usize {
         self.counts[variable]
     }
 
     /// Every box of cells, with its volume.
-    pub fn boxes(&self) -> &[(CellBox, usize)] {
+    pub(super) fn boxes(&self) -> &[(CellBox, usize)] {
         self.boxes.get_or_init(|| self.all_boxes())
     }
 
     /// The box of all cells.
-    pub fn whole(&self) -> CellBox {
+    pub(super) fn whole(&self) -> CellBox {
         CellBox {
             low: vec![0; self.counts.len()],
             high: self.counts.iter().map(|count| count - 1).collect(),
@@ -113,7 +113,7 @@ impl Lattice {
     }
 
     /// The cell of a mean; one outside the bounds belongs to the nearest.
-    pub fn cell(&self, mean: &[f64]) -> usize {
+    pub(super) fn cell(&self, mean: &[f64]) -> usize {
         (0..mean.len()).rev().fold(0, |cell, i| {
             // A negative quotient becomes 0.
             let index = ((mean[i] - self.low[i]) / self.side[i]) as usize;
@@ -122,7 +122,7 @@ impl Lattice {
     }
 
     /// Index of a cell along every variable.
-    pub fn index(&self, mut cell: usize) -> Vec<usize> {
+    pub(super) fn index(&self, mut cell: usize) -> Vec<usize> {
         self.counts
             .iter()
             .map(|count| {
@@ -134,14 +134,14 @@ impl Lattice {
     }
 
     /// Whether it is a box of cells of this lattice.
-    pub fn holds(&self, cells: &CellBox) -> bool {
+    pub(super) fn holds(&self, cells: &CellBox) -> bool {
         let n = self.counts.len();
         let side = |i: usize| cells.low[i] <= cells.high[i] && cells.high[i] < self.counts[i];
         cells.low.len() == n && cells.high.len() == n && (0..n).all(side)
     }
 
     /// The cells of a box.
-    pub fn cells<'a>(&'a self, cells: &'a CellBox) -> impl Iterator<Item = usize> + 'a {
+    pub(super) fn cells<'a>(&'a self, cells: &'a CellBox) -> impl Iterator<Item = usize> + 'a {
         let mut index = Some(cells.low.clone());
         std::iter::from_fn(move || {
             let at = index.as_mut()?;
@@ -160,7 +160,7 @@ impl Lattice {
     }
 
     /// Squared distance from a cell to a box, in units of state.
-    pub fn distance(&self, cell: usize, cells: &CellBox) -> f64 {
+    pub(super) fn distance(&self, cell: usize, cells: &CellBox) -> f64 {
         let index = self.index(cell);
         (0..index.len())
             .map(|i| {
@@ -173,7 +173,7 @@ impl Lattice {
     }
 
     /// Corners of a box.
-    pub fn corners(&self, cells: &CellBox) -> (Vec<f64>, Vec<f64>) {
+    pub(super) fn corners(&self, cells: &CellBox) -> (Vec<f64>, Vec<f64>) {
         let at = |i: usize, index: usize| self.low[i] + self.side[i] * index as f64;
         let along = 0..self.counts.len();
         (
@@ -183,7 +183,7 @@ impl Lattice {
     }
 
     /// The means whose cell lies in a box, those outside the bounds included.
-    pub fn place(&self, cells: &CellBox) -> Place {
+    pub(super) fn place(&self, cells: &CellBox) -> Place {
         let (lower, upper) = self.corners(cells);
         let side = |i: usize| {
             let low = if cells.low[i] == 0 {
@@ -202,7 +202,7 @@ impl Lattice {
     }
 
     /// Sums over boxes of a number per cell.
-    pub fn sums(&self, value: impl Fn(usize) -> f64) -> Sums {
+    pub(super) fn sums(&self, value: impl Fn(usize) -> f64) -> Sums {
         let shape: Vec<usize> = self.counts.iter().map(|count| count + 1).collect();
         let mut table = vec![0.0; shape.iter().product()];
         let place = |index: &[usize]| {
@@ -236,7 +236,7 @@ pub(super) struct Sums {
 
 impl Sums {
     /// Sum over a box.
-    pub fn over(&self, cells: &CellBox) -> f64 {
+    pub(super) fn over(&self, cells: &CellBox) -> f64 {
         let n = self.shape.len();
         (0..1_u32 << n)
             .map(|corner| {
@@ -261,7 +261,7 @@ impl Sums {
 
 impl CellBox {
     /// Number of cells.
-    pub fn volume(&self) -> usize {
+    pub(super) fn volume(&self) -> usize {
         self.low
             .iter()
             .zip(&self.high)
@@ -270,7 +270,7 @@ impl CellBox {
     }
 
     /// The smallest box that holds both.
-    pub fn hull(&self, other: &Self) -> Self {
+    pub(super) fn hull(&self, other: &Self) -> Self {
         Self {
             low: self
                 .low

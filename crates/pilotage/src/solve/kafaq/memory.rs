@@ -36,7 +36,7 @@ pub(super) enum Kind {
 
 impl Memory {
     /// The memory that remembers nothing.
-    pub fn none() -> Self {
+    pub(super) fn none() -> Self {
         Self {
             kind: Kind::None,
             places: Vec::new(),
@@ -46,7 +46,12 @@ impl Memory {
     }
 
     /// A memory of events at these places.
-    pub fn of_events(kind: Kind, places: Vec<Vec<f64>>, threshold: f64, unit: Vec<f64>) -> Self {
+    pub(super) fn of_events(
+        kind: Kind,
+        places: Vec<Vec<f64>>,
+        threshold: f64,
+        unit: Vec<f64>,
+    ) -> Self {
         Self {
             kind,
             places,
@@ -56,7 +61,7 @@ impl Memory {
     }
 
     /// Whether it is one that so many state variables and actions can have.
-    pub fn fits(&self, states: usize, actions: usize) -> bool {
+    pub(super) fn fits(&self, states: usize, actions: usize) -> bool {
         let events = match self.kind {
             Kind::None => return true,
             Kind::Place => true,
@@ -70,7 +75,7 @@ impl Memory {
     }
 
     /// Number of memories.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         match self.kind {
             Kind::None => 1,
             Kind::Place => 1 + self.places.len(),
@@ -79,12 +84,12 @@ impl Memory {
     }
 
     /// Whether the reward is that of an event.
-    pub fn is_event(&self, reward: f64) -> bool {
+    pub(super) fn is_event(&self, reward: f64) -> bool {
         self.kind != Kind::None && reward >= self.threshold
     }
 
     /// The memory after an action, the reward seen and the mean reached.
-    pub fn next(&self, memory: usize, action: ActionId, reward: f64, mean: &[f64]) -> usize {
+    pub(super) fn next(&self, memory: usize, action: ActionId, reward: f64, mean: &[f64]) -> usize {
         if !self.is_event(reward) {
             return self.without_event(memory, action);
         }
@@ -96,7 +101,7 @@ impl Memory {
     }
 
     /// The memory after an action that brought no event.
-    pub fn without_event(&self, memory: usize, action: ActionId) -> usize {
+    pub(super) fn without_event(&self, memory: usize, action: ActionId) -> usize {
         match self.kind {
             Kind::PlaceAndParity(counted) if counted == action => memory ^ 1,
             _ => memory,
@@ -104,7 +109,7 @@ impl Memory {
     }
 
     /// The memory in words.
-    pub fn name(&self, memory: usize) -> String {
+    pub(super) fn name(&self, memory: usize) -> String {
         let (place, odd) = match self.kind {
             Kind::None => return String::new(),
             Kind::Place => (memory, false),
@@ -124,7 +129,7 @@ impl Memory {
     }
 
     /// The memory in a sentence.
-    pub fn describe(&self, actions: &[String]) -> String {
+    pub(super) fn describe(&self, actions: &[String]) -> String {
         match self.kind {
             Kind::None => "no memory".to_owned(),
             Kind::Place => format!("the place of the last event, of {}", self.places.len()),

@@ -42,7 +42,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-pub use crate::solve::Worlds;
+use crate::solve::Worlds;
 pub use curves::drawn;
 pub use settings::{Rules, Settings};
 

@@ -97,7 +97,7 @@ pub(super) struct State {
 }
 
 impl State {
-    pub fn new(task: &Task<'_>) -> Self {
+    pub(super) fn new(task: &Task<'_>) -> Self {
         Self {
             experience: Experience::default(),
             regions: vec![first_region(task)],
@@ -109,7 +109,7 @@ impl State {
     }
 
     /// Whether it is one that a task can have.
-    pub fn fits(&self, task: &Task<'_>) -> bool {
+    pub(super) fn fits(&self, task: &Task<'_>) -> bool {
         let settings = &task.settings;
         let (states, actions) = (task.mdp.model().state_dim(), task.actions());
         let point = |point: &Point| {
@@ -133,7 +133,7 @@ impl State {
     }
 
     /// SegmentSteadyLevel by the printed rules: an episode.
-    pub fn advance(&mut self, task: &Task<'_>, observer: &dyn Progress) -> ControlFlow<()> {
+    pub(super) fn advance(&mut self, task: &Task<'_>, observer: &dyn Progress) -> ControlFlow<()> {
         if self.is_over(task) {
             return ControlFlow::Break(());
         }
@@ -202,7 +202,7 @@ impl State {
         }
     }
 
-    pub fn learned(&self, task: &Task<'_>) -> Learned {
+    pub(super) fn learned(&self, task: &Task<'_>) -> Learned {
         Learned {
             automaton: compile(task, &self.regions),
             converged: self.calm >= CALM,

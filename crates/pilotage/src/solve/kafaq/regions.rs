@@ -20,7 +20,7 @@ pub(super) struct Region {
 
 impl Region {
     /// Whether it is one of this lattice and so many actions.
-    pub fn fits(&self, lattice: &Lattice, actions: usize) -> bool {
+    pub(super) fn fits(&self, lattice: &Lattice, actions: usize) -> bool {
         lattice.holds(&self.cells) && self.action < actions
     }
 }
@@ -62,7 +62,7 @@ pub(super) struct Reviser<'a> {
 
 impl<'a> Reviser<'a> {
     /// A reviser to whom a region has to be worth `worth` a visit.
-    pub fn new(lattice: &'a Lattice, settings: &Settings, worth: f64) -> Self {
+    pub(super) fn new(lattice: &'a Lattice, settings: &Settings, worth: f64) -> Self {
         Self {
             lattice,
             split: critical(settings.split_error),
@@ -72,7 +72,7 @@ impl<'a> Reviser<'a> {
     }
 
     /// Best action, split, extend and merge until nothing changes; returns the visits whose action has changed.
-    pub fn revise(&self, evidence: &Halves, regions: &mut Vec<Region>) -> f64 {
+    pub(super) fn revise(&self, evidence: &Halves, regions: &mut Vec<Region>) -> f64 {
         if evidence.all.total() == 0.0 {
             return 0.0;
         }
@@ -92,7 +92,7 @@ impl<'a> Reviser<'a> {
     }
 
     /// Splits until no split is confirmed, then merges; returns whether anything changed. For levels that inherit their regions.
-    pub fn refine(&self, evidence: &Halves, regions: &mut Vec<Region>) -> bool {
+    pub(super) fn refine(&self, evidence: &Halves, regions: &mut Vec<Region>) -> bool {
         let splits = (0..ROUNDS)
             .take_while(|_| self.split_region(evidence, regions))
             .count();

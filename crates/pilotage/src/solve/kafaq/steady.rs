@@ -74,7 +74,7 @@ impl Crossings {
     }
 
     /// Arrivals in a cell from a memory by an action.
-    pub fn arrivals(&self, memory: usize, action: usize, cell: usize) -> f64 {
+    pub(super) fn arrivals(&self, memory: usize, action: usize, cell: usize) -> f64 {
         self.arrivals[self.place(memory, action, cell)]
     }
 
@@ -115,7 +115,7 @@ pub(super) struct Earned {
 
 impl Steady {
     /// Nothing learned yet: one region for every memory, the whole world.
-    pub fn new(task: &Task<'_>, memory: Memory) -> Self {
+    pub(super) fn new(task: &Task<'_>, memory: Memory) -> Self {
         let (memories, cells, actions) = (memory.len(), task.lattice.len(), task.actions());
         let whole = Region {
             cells: task.lattice.whole(),
@@ -134,7 +134,7 @@ impl Steady {
     }
 
     /// Whether it is what can have been learned of a task.
-    pub fn fits(&self, task: &Task<'_>) -> bool {
+    pub(super) fn fits(&self, task: &Task<'_>) -> bool {
         let (settings, cells, actions) = (&task.settings, task.lattice.len(), task.actions());
         if !self.memory.fits(task.mdp.model().state_dim(), actions) {
             return false;
@@ -159,27 +159,27 @@ impl Steady {
     }
 
     /// Whether the regions no longer change.
-    pub fn converged(&self, task: &Task<'_>) -> bool {
+    pub(super) fn converged(&self, task: &Task<'_>) -> bool {
         self.calm >= task.settings.calm
     }
 
     /// Whether learning is over.
-    pub fn finished(&self, task: &Task<'_>) -> bool {
+    pub(super) fn finished(&self, task: &Task<'_>) -> bool {
         self.converged(task) || self.epoch >= task.settings.epoch_limit
     }
 
     /// Epochs so far.
-    pub fn epochs(&self) -> usize {
+    pub(super) fn epochs(&self) -> usize {
         self.epoch
     }
 
     /// The row of the table that a memory and cell have.
-    pub fn row(&self, task: &Task<'_>, memory: usize, cell: usize) -> usize {
+    pub(super) fn row(&self, task: &Task<'_>, memory: usize, cell: usize) -> usize {
         memory * task.lattice.len() + cell
     }
 
     /// Acts for an epoch of whole episodes, then revises the regions.
-    pub fn run_epoch(&mut self, task: &Task<'_>, experience: &mut Experience) -> Earned {
+    pub(super) fn run_epoch(&mut self, task: &Task<'_>, experience: &mut Experience) -> Earned {
         let settings = &task.settings;
         let entries = self.memory.len() * task.lattice.len() * task.actions();
         let least = settings.epoch.max(settings.epoch_per_cell * entries) as u64;
@@ -295,7 +295,7 @@ impl Steady {
     }
 
     /// Mean size of the best value over all visits, against which worth is measured.
-    pub fn mean_value(&self, task: &Task<'_>) -> f64 {
+    pub(super) fn mean_value(&self, task: &Task<'_>) -> f64 {
         let (mut sum, mut visits) = (0.0, 0.0);
         for (memory, evidence) in self.evidence.iter().enumerate() {
             for cell in 0..task.lattice.len() {
@@ -308,7 +308,7 @@ impl Steady {
     }
 
     /// Mean value of a region's action over its visits.
-    pub fn region_value(&self, task: &Task<'_>, memory: usize, region: &Region) -> f64 {
+    pub(super) fn region_value(&self, task: &Task<'_>, memory: usize, region: &Region) -> f64 {
         let (mut sum, mut visits) = (0.0, 1e-9);
         for cell in task.lattice.cells(&region.cells) {
             let weight = self.evidence[memory].all.visits(cell);

@@ -17,7 +17,7 @@ pub(super) const SOLVER: &str = "kafaq";
 const MOST_BOXES: f64 = 1e7;
 
 /// The learner's task.
-pub struct Task<'a> {
+pub(super) struct Task<'a> {
     /// What the agent assumes, without map, rewards, events and modes.
     pub(super) mdp: BeliefMdp,
     pub(super) settings: Settings,
@@ -35,7 +35,7 @@ pub struct Task<'a> {
 impl<'a> Task<'a> {
     /// The task of a model, of which only A, B, H, Q, R, the bounds, the start belief, the discount and the length of an episode are
     /// looked at.
-    pub fn new(model: &Model, settings: Settings, worlds: &'a Worlds<'a>) -> Result<Self> {
+    pub(super) fn new(model: &Model, settings: Settings, worlds: &'a Worlds<'a>) -> Result<Self> {
         settings.validate()?;
         let fingerprint = model.fingerprint();
         let mdp = BeliefMdp::new(&known(model));
@@ -97,22 +97,22 @@ impl<'a> Task<'a> {
     }
 
     /// Number of actions.
-    pub fn actions(&self) -> usize {
+    pub(super) fn actions(&self) -> usize {
         self.mdp.model().actions.len()
     }
 
     /// Discount factor.
-    pub fn discount(&self) -> f64 {
+    pub(super) fn discount(&self) -> f64 {
         self.mdp.model().discount
     }
 
     /// The steady level.
-    pub fn steady(&self) -> StratumId {
+    pub(super) fn steady(&self) -> StratumId {
         self.chain[self.chain.len() - 1]
     }
 
     /// The neighbourhood of a mean.
-    pub fn cell(&self, mean: &[f64]) -> usize {
+    pub(super) fn cell(&self, mean: &[f64]) -> usize {
         match &self.coordinates {
             None => self.lattice.cell(mean),
             Some(coordinates) => {
@@ -124,7 +124,7 @@ impl<'a> Task<'a> {
     }
 
     /// Standard deviation along each variable at the steady level.
-    pub fn deviations(&self) -> Vec<f64> {
+    pub(super) fn deviations(&self) -> Vec<f64> {
         let covariance = self.mdp.covariance(self.steady());
         (0..covariance.nrows())
             .map(|i| covariance[(i, i)].sqrt())
@@ -132,12 +132,12 @@ impl<'a> Task<'a> {
     }
 
     /// An actor in a new world.
-    pub fn actor(&self) -> Actor<'_> {
+    pub(super) fn actor(&self) -> Actor<'_> {
         Actor::new(self.worlds, &self.filter, self.filter.readings())
     }
 
     /// Runs an automaton, the same episodes at every trial.
-    pub fn trial(&self, automaton: &Automaton) -> Trial {
+    pub(super) fn trial(&self, automaton: &Automaton) -> Trial {
         let Settings { trial, seed, .. } = self.settings;
         run_trial(self.mdp.model(), self.worlds, automaton, trial, seed)
     }

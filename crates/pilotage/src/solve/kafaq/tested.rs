@@ -35,7 +35,7 @@ struct Best {
 }
 
 impl State {
-    pub fn new(task: &Task<'_>) -> Self {
+    pub(super) fn new(task: &Task<'_>) -> Self {
         Self {
             experience: Experience::default(),
             curve: Vec::new(),
@@ -46,7 +46,7 @@ impl State {
     }
 
     /// Whether it is one that a task can have.
-    pub fn fits(&self, task: &Task<'_>) -> bool {
+    pub(super) fn fits(&self, task: &Task<'_>) -> bool {
         let (axes, actions) = (task.lattice.whole().low.len(), task.actions());
         // With every action at most one memory is tried, and two besides.
         let most_tried = actions + 2;
@@ -65,7 +65,7 @@ impl State {
     }
 
     /// An epoch, and what follows from it where it was the last of a memory.
-    pub fn advance(&mut self, task: &Task<'_>, observer: &dyn Progress) -> ControlFlow<()> {
+    pub(super) fn advance(&mut self, task: &Task<'_>, observer: &dyn Progress) -> ControlFlow<()> {
         if let Some(steady) = self.learning.take() {
             self.learning = self.learn(task, steady, observer);
             if self.learning.is_none() {
@@ -201,7 +201,7 @@ impl State {
     }
 
     /// What was learned so far; before the first memory is learned, what its regions say.
-    pub fn learned(&self, task: &Task<'_>) -> Learned {
+    pub(super) fn learned(&self, task: &Task<'_>) -> Learned {
         let unfinished = || {
             let steady = self.learning.clone();
             let steady = steady.unwrap_or_else(|| Steady::new(task, Memory::none()));

@@ -53,7 +53,7 @@ impl Branches {
     }
 
     /// The same planner with another horizon.
-    pub fn with_horizon(&self, horizon: usize) -> Self {
+    pub(crate) fn with_horizon(&self, horizon: usize) -> Self {
         Self {
             mdp: self.mdp.clone(),
             settings: Settings {
@@ -64,12 +64,12 @@ impl Branches {
     }
 
     /// Steps it looks ahead.
-    pub fn horizon(&self) -> usize {
+    pub(crate) fn horizon(&self) -> usize {
         self.settings.horizon
     }
 
     /// The decision process.
-    pub fn mdp(&self) -> &BeliefMdp {
+    pub(crate) fn mdp(&self) -> &BeliefMdp {
         &self.mdp
     }
 

@@ -71,7 +71,7 @@ pub struct Outlook {
 
 impl Outlook {
     /// The outlook of an agent whose mean is N(.., covariance) at a level.
-    pub fn new(mdp: &BeliefMdp, level: StratumId, covariance: DMatrix<f64>) -> Self {
+    pub(crate) fn new(mdp: &BeliefMdp, level: StratumId, covariance: DMatrix<f64>) -> Self {
         let total = mdp.covariance(level) + &covariance;
         Self {
             level,

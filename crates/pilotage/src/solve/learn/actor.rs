@@ -6,7 +6,7 @@ use crate::solve::learn::Worlds;
 use crate::world::{Observation, Step, Streams, World};
 
 /// A world and the belief about it.
-pub struct Actor<'a> {
+pub(crate) struct Actor<'a> {
     world: Box<dyn World>,
     tracker: Box<dyn Tracker + 'a>,
     observation: Observation,
@@ -14,7 +14,7 @@ pub struct Actor<'a> {
 
 impl<'a> Actor<'a> {
     /// An actor in a new world, with a sensor of so many readings.
-    pub fn new(worlds: &Worlds<'_>, tracking: &'a dyn Tracking, readings: usize) -> Self {
+    pub(crate) fn new(worlds: &Worlds<'_>, tracking: &'a dyn Tracking, readings: usize) -> Self {
         Self {
             world: worlds(),
             tracker: tracking.tracker(),
@@ -23,18 +23,18 @@ impl<'a> Actor<'a> {
     }
 
     /// What it believes.
-    pub fn belief(&self) -> &Belief {
+    pub(crate) fn belief(&self) -> &Belief {
         self.tracker.belief()
     }
 
     /// Starts an episode.
-    pub fn reset(&mut self, draws: &mut Streams) {
+    pub(crate) fn reset(&mut self, draws: &mut Streams) {
         self.world.reset(draws);
         self.tracker.reset();
     }
 
     /// Takes an action and what it brings into the belief.
-    pub fn step(&mut self, action: ActionId, draws: &mut Streams) -> Step {
+    pub(crate) fn step(&mut self, action: ActionId, draws: &mut Streams) -> Step {
         let step = self.world.step(action, draws, &mut self.observation);
         match step.then {
             Then::Continue => self.tracker.update(action, self.observation.reading()),
@@ -46,7 +46,7 @@ impl<'a> Actor<'a> {
 }
 
 /// The part of a model that a learner is told.
-pub fn known(model: &Model) -> Model {
+pub(crate) fn known(model: &Model) -> Model {
     let mut start = model.start.clone();
     start.iter_mut().for_each(|hypothesis| hypothesis.mode = 0);
     Model {

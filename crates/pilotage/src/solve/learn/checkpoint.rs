@@ -63,7 +63,7 @@ impl<S: Clone + PartialEq + Serialize + DeserializeOwned> Owner<'_, S> {
     }
 
     /// Reads the state of a run of this owner.
-    pub fn load<T: DeserializeOwned>(&self, path: &Path) -> Result<T> {
+    pub(crate) fn load<T: DeserializeOwned>(&self, path: &Path) -> Result<T> {
         let refuse = |reason: String| Error::Checkpoint {
             path: path.to_owned(),
             reason,

@@ -6,11 +6,11 @@ use crate::random::{Rng, Role, stream};
 use crate::world::Streams;
 
 /// More episodes or steps than any run comes to.
-pub const MOST_COUNTED: u64 = 1 << 60;
+pub(super) const MOST_COUNTED: u64 = 1 << 60;
 
 /// What a learner has met.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct Experience {
+pub(crate) struct Experience {
     pub episodes: u64,
     pub samples: u64,
     /// Smallest and largest reward, 0 included.
@@ -21,7 +21,7 @@ pub struct Experience {
 
 impl Experience {
     /// Whether it is that of a run so far, in a state of so many variables.
-    pub fn fits(&self, states: usize) -> bool {
+    pub(crate) fn fits(&self, states: usize) -> bool {
         let counted = |count: u64| count <= MOST_COUNTED;
         counted(self.episodes)
             && counted(self.samples)
@@ -31,7 +31,7 @@ impl Experience {
     }
 
     /// Random numbers of the next episode: for the world, and for exploration.
-    pub fn next_episode(&mut self, seed: u64) -> (Streams, Rng) {
+    pub(crate) fn next_episode(&mut self, seed: u64) -> (Streams, Rng) {
         let episode = self.episodes;
         self.episodes += 1;
         (
@@ -41,18 +41,18 @@ impl Experience {
     }
 
     /// Takes in a step.
-    pub fn collect(&mut self, reward: f64) {
+    pub(crate) fn collect(&mut self, reward: f64) {
         self.samples += 1;
         self.rewards = (self.rewards.0.min(reward), self.rewards.1.max(reward));
     }
 
     /// Whether a reward is at least this share of the largest one met.
-    pub fn is_notable(&self, reward: f64, share: f64) -> bool {
+    pub(crate) fn is_notable(&self, reward: f64, share: f64) -> bool {
         reward > 0.0 && reward >= share * self.rewards.1
     }
 
     /// Difference between the largest and the smallest reward, more than 0.
-    pub fn reward_range(&self) -> f64 {
+    pub(crate) fn reward_range(&self) -> f64 {
         (self.rewards.1 - self.rewards.0).max(1e-6)
     }
 }

@@ -16,4 +16,4 @@ pub use run::{Course, Learned, Run, learn};
 pub(super) use table::{Rates, Table, Transition, any_action, boltzmann};
 pub(super) use trial::{Trial, critical, discounted, run_trial, undiscounted};
 
-pub use super::solver::Worlds;
+pub(super) use super::solver::Worlds;

@@ -11,7 +11,7 @@ const FADED: f64 = 0.01;
 
 /// Values `Q(row, action)`, where a row is a memory and a neighbourhood, and the visits that set their learning rates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Table {
+pub(crate) struct Table {
     actions: usize,
     values: Vec<f64>,
     visits: Vec<u64>,
@@ -22,7 +22,7 @@ pub struct Table {
 
 /// Learning rates and traces of [`Table::td_update`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rates {
+pub(crate) struct Rates {
     /// Watkins' lambda, in `[0, 1]`; 0 is one-step Q-learning.
     pub lambda: f64,
     /// Learning rate `max(floor, (1 + n)^-power)` at the n-th visit.
@@ -33,7 +33,7 @@ pub struct Rates {
 
 /// A step as the table learns from it.
 #[derive(Debug, Clone, Copy)]
-pub struct Transition {
+pub(crate) struct Transition {
     pub row: usize,
     pub action: ActionId,
     pub reward: f64,
@@ -42,7 +42,7 @@ pub struct Transition {
 }
 
 impl Table {
-    pub fn new(rows: usize, actions: usize) -> Self {
+    pub(crate) fn new(rows: usize, actions: usize) -> Self {
         Self {
             actions,
             values: vec![0.0; rows * actions],
@@ -52,7 +52,7 @@ impl Table {
     }
 
     /// Whether it is a table of so many rows and actions.
-    pub fn fits(&self, rows: usize, actions: usize) -> bool {
+    pub(crate) fn fits(&self, rows: usize, actions: usize) -> bool {
         self.actions == actions
             && self.values.len() == rows * actions
             && self.visits.len() == rows * actions
@@ -60,12 +60,12 @@ impl Table {
     }
 
     /// Values of the actions in a row.
-    pub fn row(&self, row: usize) -> &[f64] {
+    pub(crate) fn row(&self, row: usize) -> &[f64] {
         &self.values[row * self.actions..(row + 1) * self.actions]
     }
 
     /// Value of the best action in a row.
-    pub fn best(&self, row: usize) -> f64 {
+    pub(crate) fn best(&self, row: usize) -> f64 {
         self.row(row)
             .iter()
             .copied()
@@ -73,7 +73,7 @@ impl Table {
     }
 
     /// The best action in a row, the first of equals.
-    pub fn best_action(&self, row: usize) -> ActionId {
+    pub(crate) fn best_action(&self, row: usize) -> ActionId {
         let values = self.row(row);
         (1..values.len()).fold(0, |best, action| {
             if values[action] > values[best] {
@@ -85,13 +85,13 @@ impl Table {
     }
 
     /// Forgets what led here; an episode has ended.
-    pub fn forget_traces(&mut self) {
+    pub(crate) fn forget_traces(&mut self) {
         self.traces.clear();
     }
 
     /// TD-Update: Watkins' Q(lambda) with replacing traces, which an exploring action cuts. Returns the target
     /// `r + discount max Q(next)`.
-    pub fn td_update(&mut self, rates: Rates, discount: f64, step: Transition) -> f64 {
+    pub(crate) fn td_update(&mut self, rates: Rates, discount: f64, step: Transition) -> f64 {
         let at = step.row * self.actions + step.action;
         let target = step.reward + step.next.map_or(0.0, |next| discount * self.best(next));
         let error = target - self.values[at];
@@ -112,7 +112,7 @@ impl Table {
 }
 
 /// Boltzmann-Action-Selection at a temperature, with a share of uniform draws.
-pub fn boltzmann(values: &[f64], temperature: f64, explore: f64, rng: &mut Rng) -> ActionId {
+pub(crate) fn boltzmann(values: &[f64], temperature: f64, explore: f64, rng: &mut Rng) -> ActionId {
     if uniform(rng) < explore {
         return any_action(values.len(), rng);
     }
@@ -127,7 +127,7 @@ pub fn boltzmann(values: &[f64], temperature: f64, explore: f64, rng: &mut Rng) 
 }
 
 /// One of so many actions, each as likely as another.
-pub fn any_action(actions: usize, rng: &mut Rng) -> ActionId {
+pub(crate) fn any_action(actions: usize, rng: &mut Rng) -> ActionId {
     ((uniform(rng) * actions as f64) as usize).min(actions - 1)
 }
 

@@ -17,7 +17,7 @@ const CHUNK: usize = 25;
 
 /// What an automaton earned.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Trial {
+pub(crate) struct Trial {
     pub episodes: Vec<Episode>,
     /// Steps spent in each node.
     pub visits: Vec<f64>,
@@ -25,7 +25,7 @@ pub struct Trial {
 
 impl Trial {
     /// Steps taken.
-    pub fn steps(&self) -> u64 {
+    pub(crate) fn steps(&self) -> u64 {
         self.episodes
             .iter()
             .map(|episode| episode.steps as u64)
@@ -33,12 +33,12 @@ impl Trial {
     }
 
     /// Mean of a return.
-    pub fn mean(&self, of: fn(&Episode) -> f64) -> f64 {
+    pub(crate) fn mean(&self, of: fn(&Episode) -> f64) -> f64 {
         self.episodes.iter().map(of).sum::<f64>() / self.episodes.len() as f64
     }
 
     /// Standard errors by which a return exceeds that of another trial, episode by episode.
-    pub fn excess(&self, other: &Self, of: fn(&Episode) -> f64) -> f64 {
+    pub(crate) fn excess(&self, other: &Self, of: fn(&Episode) -> f64) -> f64 {
         let pairs = self.episodes.iter().zip(&other.episodes);
         let differences: Vec<f64> = pairs.map(|(a, b)| of(a) - of(b)).collect();
         let estimate = crate::simulate::Estimate::of(differences.iter().copied());
@@ -51,7 +51,7 @@ impl Trial {
 
     /// Whether neither return is less than that of another trial by more than this share of it, nor surely (by so many standard
     /// errors) less at all.
-    pub fn loses_nothing(&self, before: &Self, worth: f64, surely: f64) -> bool {
+    pub(crate) fn loses_nothing(&self, before: &Self, worth: f64, surely: f64) -> bool {
         [discounted, undiscounted].into_iter().all(|of| {
             let least = before.mean(of) - worth * before.mean(of).abs();
             self.mean(of) >= least && self.excess(before, of) > -surely
@@ -60,17 +60,17 @@ impl Trial {
 }
 
 /// Discounted return of an episode.
-pub fn discounted(episode: &Episode) -> f64 {
+pub(crate) fn discounted(episode: &Episode) -> f64 {
     episode.discounted
 }
 
 /// Undiscounted return of an episode.
-pub fn undiscounted(episode: &Episode) -> f64 {
+pub(crate) fn undiscounted(episode: &Episode) -> f64 {
     episode.undiscounted
 }
 
 /// Runs an automaton that learning in `model` made, for so many episodes, the same ones at every trial.
-pub fn run_trial(
+pub(crate) fn run_trial(
     model: &Model,
     worlds: &Worlds<'_>,
     automaton: &Automaton,
@@ -144,7 +144,7 @@ impl Agent for Visitor {
 }
 
 /// The `z` that N(0, 1) exceeds with the given probability, in `(0, 0.5)`.
-pub fn critical(probability: f64) -> f64 {
+pub(crate) fn critical(probability: f64) -> f64 {
     let (mut low, mut high) = (0.0, 40.0);
     for _ in 0..80 {
         let middle: f64 = 0.5 * (low + high);

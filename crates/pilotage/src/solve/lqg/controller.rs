@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Stage;
+use super::stage::Stage;
 use crate::belief::BeliefMdp;
 use crate::belief::is_kept;
 use crate::belief::kalman::Correction;

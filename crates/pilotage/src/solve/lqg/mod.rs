@@ -11,11 +11,11 @@
 
 mod controller;
 mod nearest;
+mod stage;
 
 pub use controller::LqgController;
 pub use nearest::{NearestAction, Weights};
 
-use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,8 +23,7 @@ use super::Form;
 use super::refusals;
 use super::settings::{Settings, ensure};
 use super::solver::{Found, Plan, Planner, Problem, refuse_if};
-use crate::belief::kalman::symmetric;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::{Interval, Model};
 use crate::progress::Progress;
 
@@ -98,7 +97,7 @@ impl Planner for Lqg {
 
 /// Which of its two uses a model is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Use {
+enum Use {
     /// A free control and a quadratic cost, solved exactly.
     Control,
     /// A choice among actions, for whatever reward the model pays.
@@ -106,7 +105,7 @@ pub enum Use {
 }
 
 /// Which use a model is for, or why it is for neither and what would do.
-pub fn use_of(model: &Model) -> std::result::Result<Use, String> {
+fn use_of(model: &Model) -> std::result::Result<Use, String> {
     let limited = |&(_, side): &(usize, Interval)| side != Interval::ALL;
     let fails = model.episode.alive.sides.iter().any(limited);
     let pays = !model.rewards.is_empty() || !model.events.is_empty() || fails;
@@ -117,44 +116,5 @@ pub fn use_of(model: &Model) -> std::result::Result<Use, String> {
         (None, _) => Err(
             "nothing says what is to be held near the origin; add a [cost], or limits to `episode.alive`".to_owned(),
         ),
-    }
-}
-
-/// One step of the Riccati recursion backwards in time.
-#[derive(Debug, Clone)]
-struct Stage {
-    /// `L = M^-1 g B' S_next A`, the gain, `p x n`.
-    gain: DMatrix<f64>,
-    /// `M = R + g B' S_next B`, what a deviation from the command costs, `p x p`.
-    deviation: DMatrix<f64>,
-    /// `S = Q + g A' S_next A - L' M L`, what the state costs from here on, `n x n`.
-    cost: DMatrix<f64>,
-}
-
-impl Stage {
-    fn new(
-        a: &DMatrix<f64>,
-        b: &DMatrix<f64>,
-        (state, control): (&DMatrix<f64>, &DMatrix<f64>),
-        discount: f64,
-        next: &DMatrix<f64>,
-    ) -> Result<Self> {
-        let pushed = b.transpose() * next * discount;
-        let deviation = symmetric(control + &pushed * b);
-        let Some(cholesky) = deviation.clone().cholesky() else {
-            return Err(Error::NotPositiveDefinite {
-                what: "the cost of control, R + B' S B,",
-                eigenvalue: deviation.symmetric_eigenvalues().min(),
-            });
-        };
-        let gain = cholesky.solve(&(pushed * a));
-        let cost = symmetric(
-            state + a.transpose() * next * a * discount - gain.transpose() * &deviation * &gain,
-        );
-        Ok(Self {
-            gain,
-            deviation,
-            cost,
-        })
     }
 }

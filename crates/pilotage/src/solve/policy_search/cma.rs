@@ -9,7 +9,7 @@ use crate::random::{Role, normal, stream};
 
 /// A normal distribution over parameters that moves to where the function is small.
 #[derive(Debug, Clone)]
-pub struct Evolution {
+pub(crate) struct Evolution {
     mean: DVector<f64>,
     /// Overall step size.
     step: f64,
@@ -40,7 +40,7 @@ struct Rates {
 
 impl Evolution {
     /// Starts at `mean` with standard deviation `step` in every direction. `population` is at least 2.
-    pub fn new(mean: &[f64], step: f64, population: usize, seed: u64) -> Self {
+    pub(crate) fn new(mean: &[f64], step: f64, population: usize, seed: u64) -> Self {
         let n = mean.len();
         let half = population / 2;
         let raw = |rank: usize| (half as f64 + 0.5).ln() - ((rank + 1) as f64).ln();
@@ -63,12 +63,12 @@ impl Evolution {
     }
 
     /// The centre of the distribution: the best estimate of the minimum, which noise deceives less than any one candidate.
-    pub fn mean(&self) -> &[f64] {
+    pub(crate) fn mean(&self) -> &[f64] {
         self.mean.as_slice()
     }
 
     /// The candidates of the next generation.
-    pub fn ask(&mut self) -> Vec<Vec<f64>> {
+    pub(crate) fn ask(&mut self) -> Vec<Vec<f64>> {
         let root = self.root(f64::sqrt);
         let mut rng = stream(self.seed, self.generation, Role::Planner);
         self.asked = (0..self.population)
@@ -81,7 +81,7 @@ impl Evolution {
     }
 
     /// Takes in the values of the candidates asked for, in their order.
-    pub fn tell(&mut self, values: &[f64]) {
+    pub(crate) fn tell(&mut self, values: &[f64]) {
         let mut order: Vec<usize> = (0..self.asked.len()).collect();
         order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
         let n = self.mean.len() as f64;
@@ -139,5 +139,48 @@ impl Rates {
                 .min(2.0 * (parents - 2.0 + 1.0 / parents) / ((n + 2.0).powi(2) + parents)),
             damping: 1.0 + 2.0 * (((parents - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + step_path,
         }
+    }
+}
+
+/// On functions with known minima.
+#[cfg(test)]
+mod tests {
+    use super::Evolution;
+
+    fn minimise(f: impl Fn(&[f64]) -> f64, start: &[f64], generations: usize) -> Vec<f64> {
+        let mut evolution = Evolution::new(start, 0.5, 10, 1);
+        for _ in 0..generations {
+            let values: Vec<f64> = evolution.ask().iter().map(|x| f(x)).collect();
+            evolution.tell(&values);
+        }
+        evolution.mean().to_vec()
+    }
+
+    #[test]
+    fn a_stretched_bowl_is_followed_to_its_bottom() {
+        let bowl =
+            |x: &[f64]| (x[0] - 1.0).powi(2) + 1e4 * (x[1] + x[0] + 2.0).powi(2) + x[2].powi(2);
+        let found = minimise(bowl, &[0.0; 3], 150);
+        for (value, expected) in found.iter().zip([1.0, -3.0, 0.0]) {
+            assert!((value - expected).abs() < 1e-6, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_curved_valley_is_followed_to_its_bottom() {
+        let rosenbrock = |x: &[f64]| 100.0 * (x[1] - x[0] * x[0]).powi(2) + (1.0 - x[0]).powi(2);
+        let found = minimise(rosenbrock, &[-1.0, 1.0], 250);
+        assert!(
+            (found[0] - 1.0).abs() < 1e-5 && (found[1] - 1.0).abs() < 1e-5,
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn the_order_of_values_is_all_that_counts() {
+        let bowl = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>();
+        let plain = minimise(bowl, &[1.0, 2.0], 30);
+        let bent = minimise(|x| bowl(x).powi(3).ln_1p(), &[1.0, 2.0], 30);
+        assert_eq!(plain, bent);
     }
 }

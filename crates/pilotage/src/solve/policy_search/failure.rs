@@ -128,7 +128,7 @@ impl Runs {
     }
 
     /// Draws the limits in until the policy fails in at least `least` of all steps, or they are a tenth of what they were.
-    pub fn with_failures(mut self, policy: &dyn Policy, sample: Sample, least: f64) -> Self {
+    pub(crate) fn with_failures(mut self, policy: &dyn Policy, sample: Sample, least: f64) -> Self {
         const FACTOR: f64 = 0.95;
         const TIMES: usize = 45;
         for _ in 0..TIMES {
@@ -154,7 +154,7 @@ impl Runs {
     }
 
     /// Probability of failing within a run. The same for any number of threads.
-    pub fn failing(&self, policy: &dyn Policy, sample: Sample) -> f64 {
+    pub(crate) fn failing(&self, policy: &dyn Policy, sample: Sample) -> f64 {
         let failed = parallel::map(sample.runs, |run| {
             let mut alive = 1.0;
             self.run(policy, sample, run, &mut |_, failure, _| {
@@ -167,7 +167,7 @@ impl Runs {
     }
 
     /// Standard deviation of the mean of the belief about where it began, by variable.
-    pub fn deviation(&self, policy: &dyn Policy, sample: Sample) -> Vec<f64> {
+    pub(crate) fn deviation(&self, policy: &dyn Policy, sample: Sample) -> Vec<f64> {
         let start = self.agent.initial().mean;
         let sums = parallel::map(sample.runs, |run| {
             let mut sum = vec![0.0; start.len()];

@@ -5,7 +5,7 @@
 //! on either side, however many variables there are, and the agent may be less uncertain later than at the start, so that each of at
 //! most three groups of levels has a command of its own. There is no grid.
 //!
-//! The search begins with the linear-quadratic regulator (`regulator`) and moves all numbers of its commands by CMA-ES ([`cma`]), to
+//! The search begins with the linear-quadratic regulator (`regulator`) and moves all numbers of its commands by CMA-ES (`cma`), to
 //! where simulations go best:
 //!
 //! - for the *return* (`returns`), the discounted return of episodes where the model holds;
@@ -14,19 +14,19 @@
 //!
 //! What is found is the best of such automata, as far as the search has come; another shape of policy may earn more.
 
-pub mod cma;
+mod cma;
 pub mod failure;
-pub mod refine;
+mod refine;
 mod regulator;
 mod returns;
 mod search;
+mod settings;
 mod survival;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+pub use settings::{Objective, PolicySearch};
 
 use super::refusals;
-use super::settings::{Settings, ensure};
+use super::settings::Settings;
 use super::solver::{Plan, Planner, Problem, refuse_if};
 use crate::belief::BeliefMdp;
 use crate::error::Result;
@@ -35,82 +35,10 @@ use crate::policy::Automaton;
 use crate::progress::Progress;
 use crate::solve::compile::annotate;
 use search::Search;
-
-/// Most [`PolicySearch::effort`].
-const MOST_EFFORT: f64 = 1000.0;
-
-/// Name of the solver in errors and policies.
-const SOLVER: &str = "policy-search";
+use settings::SOLVER;
 
 /// Episodes run to describe the nodes.
 const ANNOTATED: usize = 50;
-
-/// What a search aims at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Objective {
-    /// The discounted return of an episode, the reward of failing included.
-    #[default]
-    Return,
-    /// Staying within the failure limits; rewards are not looked at.
-    Survival,
-}
-
-/// The planner that searches switching planes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PolicySearch {
-    /// What is sought: `return`, or `survival` for staying within the failure limits whatever is paid. A model that pays nothing is
-    /// survived.
-    pub objective: Objective,
-    /// Cost of the strongest control of the actions, in units of the cost of being at a limit, for the planes it begins with; more than
-    /// 0.
-    pub control_weight: f64,
-    /// Factor on the length of all simulations; more than 0, at most 1000, and 1 is the thorough search.
-    pub effort: f64,
-}
-
-impl Default for PolicySearch {
-    fn default() -> Self {
-        Self {
-            objective: Objective::default(),
-            control_weight: 0.01,
-            effort: 1.0,
-        }
-    }
-}
-
-impl PolicySearch {
-    /// A search for survival.
-    pub fn survival() -> Self {
-        Self {
-            objective: Objective::Survival,
-            ..Self::default()
-        }
-    }
-
-    /// What is sought in a model: where nothing is paid there is only survival.
-    fn aim(&self, model: &Model) -> Objective {
-        match refusals::nothing_paid(model) {
-            Some(_) => Objective::Survival,
-            None => self.objective,
-        }
-    }
-}
-
-impl Settings for PolicySearch {
-    fn validate(&self) -> Result<()> {
-        let (weight, effort) = (self.control_weight, self.effort);
-        let within = |value: f64, most: f64| value > 0.0 && value <= most;
-        ensure(
-            "control_weight",
-            weight,
-            within(weight, f64::MAX),
-            "above 0",
-        )?;
-        let range = "above 0, at most 1000";
-        ensure("effort", effort, within(effort, MOST_EFFORT), range)
-    }
-}
 
 impl Planner for PolicySearch {
     fn name(&self) -> &'static str {

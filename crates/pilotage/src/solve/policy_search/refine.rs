@@ -6,7 +6,7 @@ use super::cma::Evolution;
 
 /// A stretch of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Phase {
+pub(crate) struct Phase {
     /// Standard deviation of the first candidates, relative to the length of each plane's normal.
     pub step: f64,
     /// Generations.
@@ -16,11 +16,11 @@ pub struct Phase {
 }
 
 /// Candidates of a generation.
-pub const POPULATION: usize = 10;
+pub(crate) const POPULATION: usize = 10;
 
 /// Moves the gains (each `p x n`, not 0) to where `cost` is least. Within a phase `cost` should use the same random numbers for
 /// all candidates, so that they are compared on equal terms. `progress` hears of every generation done.
-pub fn refine(
+pub(crate) fn refine(
     gains: &mut [DMatrix<f64>],
     phase: Phase,
     cost: impl Fn(&[DMatrix<f64>]) -> f64,

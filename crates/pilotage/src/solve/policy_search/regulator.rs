@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Objective, PolicySearch};
+use super::settings::{Objective, PolicySearch};
 use crate::belief::{BeliefMdp, StratumId};
 use crate::error::Result;
 use crate::model::{Interval, Model, Region};
@@ -17,7 +17,7 @@ use crate::solve::lqr::lqr_gain;
 const GROUPS_END: [f64; 2] = [5.0, 1.3];
 
 /// The regulator's command, which steers to [`target`].
-pub fn command(model: &Model, settings: &PolicySearch, aim: Objective) -> Result<Command> {
+pub(super) fn command(model: &Model, settings: &PolicySearch, aim: Objective) -> Result<Command> {
     // Discounting is the same as a motion that shrinks by the root of the discount with every step.
     let shrinks = match aim {
         Objective::Survival => 1.0,
@@ -45,7 +45,7 @@ pub fn command(model: &Model, settings: &PolicySearch, aim: Objective) -> Result
 
 /// Where the state is to be (length `n`): in the middle of the place that pays best, and otherwise at the origin, or in the middle of
 /// limits that leave it out.
-pub fn target(model: &Model, aim: Objective) -> DVector<f64> {
+pub(super) fn target(model: &Model, aim: Objective) -> DVector<f64> {
     let best = goal(model, aim);
     DVector::from_fn(model.state_dim(), |i, _| {
         let wanted = best.map_or(Interval::ALL, |region| region.side(i));
@@ -85,7 +85,7 @@ fn middle(side: Interval) -> Option<f64> {
 
 /// One unit of cost at the nearer limit of each variable, or where the return is the aim at the edge of the place that pays, if that is
 /// nearer (`n x n`, diagonal). The model's own cost, where it has one and the return is the aim.
-pub fn state_weights(model: &Model, aim: Objective) -> DMatrix<f64> {
+pub(super) fn state_weights(model: &Model, aim: Objective) -> DMatrix<f64> {
     let n = model.state_dim();
     if let (Objective::Return, Some(cost)) = (aim, &model.cost) {
         return cost.state.clone();
@@ -128,7 +128,7 @@ fn control_weights(model: &Model, settings: &PolicySearch, aim: Objective) -> DM
 }
 
 /// The levels of an episode in groups of like uncertainty; the last holds the steady level.
-pub fn groups_of_levels(mdp: &BeliefMdp, aim: Objective) -> Vec<Group> {
+pub(super) fn groups_of_levels(mdp: &BeliefMdp, aim: Objective) -> Vec<Group> {
     let levels = mdp.levels();
     let last = levels.len() - 1;
     let weights = state_weights(mdp.model(), aim);

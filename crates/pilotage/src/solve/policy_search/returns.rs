@@ -22,7 +22,7 @@ const JUDGED: usize = 10_000;
 const FORGOTTEN: f64 = 1e-3;
 
 /// Moves the numbers to where the discounted return is highest; returns that return, where it is a number.
-pub fn improve(search: &mut Search<'_>, numbers: &mut Numbers) -> Option<f64> {
+pub(super) fn improve(search: &mut Search<'_>, numbers: &mut Numbers) -> Option<f64> {
     let groups = search.groups.len();
     let count = |phases: &[(usize, usize, f64)]| phases.iter().map(|phase| phase.1).sum::<usize>();
     search.begin(count(&SHARED) + count(&APART) * usize::from(groups > 1));

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::failure::{Runs, Sample};
 use super::refine::{Phase, refine};
-use super::{Objective, PolicySearch, SOLVER, regulator};
+use super::regulator;
+use super::settings::{Objective, PolicySearch, SOLVER};
 use crate::belief::{BeliefMdp, StratumId};
 use crate::error::Result;
 use crate::policy::{Automaton, AutomatonRunner};
@@ -12,7 +13,7 @@ use crate::progress::Progress;
 use crate::solve::compile::planes::{self, Command, Group};
 
 /// A search under way.
-pub struct Search<'a> {
+pub(super) struct Search<'a> {
     pub mdp: &'a BeliefMdp,
     pub settings: &'a PolicySearch,
     pub observer: &'a dyn Progress,
@@ -26,11 +27,11 @@ pub struct Search<'a> {
 
 /// What a search moves, by group: `[K | c]` of the command `u = c - K m` in scaled variables (`p x (n + 1)`), or `K` alone (`p x n`)
 /// where the offset is none.
-pub type Numbers = Vec<DMatrix<f64>>;
+pub(super) type Numbers = Vec<DMatrix<f64>>;
 
 impl<'a> Search<'a> {
     /// Begins with the regulator's command everywhere, and measures the scale of every variable under it.
-    pub fn new(
+    pub(super) fn new(
         mdp: &'a BeliefMdp,
         (settings, seed): (&'a PolicySearch, u64),
         aim: Objective,
@@ -83,12 +84,12 @@ impl<'a> Search<'a> {
     }
 
     /// The level at which the agent spends its life.
-    pub fn steady(&self) -> StratumId {
+    pub(super) fn steady(&self) -> StratumId {
         self.groups[self.groups.len() - 1].1
     }
 
     /// The automaton of the numbers.
-    pub fn automaton(&self, numbers: &[DMatrix<f64>]) -> Automaton {
+    pub(super) fn automaton(&self, numbers: &[DMatrix<f64>]) -> Automaton {
         let n = self.mdp.model().state_dim();
         let command = |numbers: &DMatrix<f64>| Command {
             gain: numbers.columns(0, n).into_owned(),
@@ -105,12 +106,12 @@ impl<'a> Search<'a> {
     }
 
     /// The automaton of the numbers, laid out to be run.
-    pub fn controller(&self, numbers: &[DMatrix<f64>]) -> AutomatonRunner {
+    pub(super) fn controller(&self, numbers: &[DMatrix<f64>]) -> AutomatonRunner {
         AutomatonRunner::new(&self.automaton(numbers))
     }
 
     /// So many runs of so many steps, which effort lengthens.
-    pub fn sample(&self, runs: usize, steps: usize, phase: u64) -> Sample {
+    pub(super) fn sample(&self, runs: usize, steps: usize, phase: u64) -> Sample {
         Sample {
             runs,
             steps: self.effort(steps),
@@ -119,23 +120,23 @@ impl<'a> Search<'a> {
     }
 
     /// A number of steps or runs, times the effort; at least 1.
-    pub fn effort(&self, count: usize) -> usize {
+    pub(super) fn effort(&self, count: usize) -> usize {
         ((count as f64 * self.settings.effort) as usize).max(1)
     }
 
     /// Seed of the simulations of a phase.
-    pub fn seed_of(&self, phase: u64) -> u64 {
+    pub(super) fn seed_of(&self, phase: u64) -> u64 {
         self.seed.wrapping_mul(1000).wrapping_add(phase)
     }
 
     /// Says how many generations there will be.
-    pub fn begin(&mut self, generations: usize) {
+    pub(super) fn begin(&mut self, generations: usize) {
         self.total = generations as u64;
         self.observer.progress("policy search", 0, self.total);
     }
 
     /// Moves the numbers to where the cost is least. All candidates should meet the same random numbers.
-    pub fn phase(
+    pub(super) fn phase(
         &mut self,
         numbers: &mut [DMatrix<f64>],
         (phase, generations, step): (u64, usize, f64),

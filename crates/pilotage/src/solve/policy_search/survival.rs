@@ -21,7 +21,7 @@ const EARLY: [(usize, usize, f64); 2] = [(1000, 20, 0.3), (4000, 15, 0.15)];
 const AFTERMATH: usize = 40;
 
 /// Moves the numbers to where the belief is least likely to fail.
-pub fn improve(search: &mut Search<'_>, numbers: &mut Numbers) {
+pub(super) fn improve(search: &mut Search<'_>, numbers: &mut Numbers) {
     let early = search.groups.len() > 1;
     let steady: usize = STEADY.iter().map(|phase| phase.2).sum();
     let first: usize = EARLY.iter().map(|phase| phase.1).sum();

@@ -156,7 +156,7 @@ impl GridPolicy {
     }
 
     /// The grid of means.
-    pub fn grid(&self) -> &Grid {
+    pub(crate) fn grid(&self) -> &Grid {
         &self.grid
     }
 

@@ -20,7 +20,7 @@ impl Paid {
         self.values[row * self.columns + column]
     }
 
-    pub fn expectation(&self, rows: &[f64], columns: &[f64]) -> f64 {
+    pub(super) fn expectation(&self, rows: &[f64], columns: &[f64]) -> f64 {
         let row = |row: usize| {
             let values = &self.values[row * self.columns..(row + 1) * self.columns];
             values.iter().zip(columns).map(|(v, p)| v * p).sum::<f64>()
@@ -29,7 +29,7 @@ impl Paid {
     }
 
     /// The most that its values along one axis jump, all jumps together.
-    pub fn jumps(&self, axis: usize) -> f64 {
+    pub(super) fn jumps(&self, axis: usize) -> f64 {
         let (along, across) = match axis {
             0 => (self.rows(), self.columns),
             _ => (self.columns, self.rows()),
@@ -47,7 +47,7 @@ impl Paid {
     }
 
     /// By cell of the other axis, the most that is expected of beliefs whose mean along an axis is at its edge or farther out.
-    pub fn beyond(&self, axis: usize, reach: &Reach) -> Vec<f64> {
+    pub(super) fn beyond(&self, axis: usize, reach: &Reach) -> Vec<f64> {
         let line = |j: usize| {
             let value = |i: usize| match axis {
                 0 => self.at(i, j),
@@ -70,7 +70,7 @@ pub(super) struct Reach {
 
 impl Reach {
     /// The most that can be expected of something constant in each cell.
-    pub fn most(&self, values: &[f64]) -> f64 {
+    pub(super) fn most(&self, values: &[f64]) -> f64 {
         let cells = || values.iter().zip(&self.masses).zip(&self.falls);
         let outer = cells().filter(|(_, falls)| !**falls);
         let most = outer.fold(f64::NEG_INFINITY, |most, ((value, _), _)| most.max(*value));
