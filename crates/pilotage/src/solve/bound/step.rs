@@ -35,7 +35,7 @@ pub(super) struct Doing<'a> {
 }
 
 impl<'a> Doing<'a> {
-    pub fn new(model: &'a Model, mode: ModeId, action: ActionId) -> Self {
+    pub(super) fn new(model: &'a Model, mode: ModeId, action: ActionId) -> Self {
         let effects = model.effects(mode, action, 0).into_iter();
         let (before, after) = effects.partition(|effect| effect.when == When::Before);
         Self {
@@ -47,7 +47,7 @@ impl<'a> Doing<'a> {
     }
 
     /// The action at a state.
-    pub fn before(&self, at: &[f64]) -> Before {
+    pub(super) fn before(&self, at: &[f64]) -> Before {
         let mut tally = self.tally;
         let happened = tally.see(&self.before, at);
         let outcome = happened.unwrap_or_else(|| tally.rest());
@@ -60,7 +60,7 @@ impl<'a> Doing<'a> {
     }
 
     /// Where the state has moved to, and what happened before it moved.
-    pub fn after(&self, before: &Before, at: &[f64]) -> After {
+    pub(super) fn after(&self, before: &Before, at: &[f64]) -> After {
         if !self.model.episode.alive.contains(at) {
             return After {
                 reward: self.model.episode.failure_reward,
