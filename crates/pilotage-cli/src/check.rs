@@ -108,6 +108,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         )?;
     }
     writeln!(out, "  discount  {}", model.discount)?;
+    let sensors =
+        std::iter::once(&model.sensor).chain(model.later.iter().map(|phase| &phase.sensor));
+    let present: Vec<f64> = sensors.map(|sensor| sensor.present).collect();
+    if present.iter().any(|present| *present < 1.0) {
+        let present = present.iter().map(f64::to_string).collect::<Vec<_>>();
+        writeln!(
+            out,
+            "  readings  come with probability {}",
+            present.join(", later ")
+        )?;
+    }
+    if model.clock() > 0 {
+        writeln!(
+            out,
+            "  clock     it matters which step of an episode it is, up to step {}",
+            model.clock()
+        )?;
+    }
     let cut = if levels.converged() {
         ""
     } else {

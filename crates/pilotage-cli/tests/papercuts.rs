@@ -220,3 +220,21 @@ fn work_that_is_short_says_nothing_in_a_pipe() {
     assert!(output.status.success());
     assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
 }
+
+#[test]
+fn what_is_unusual_about_a_model_is_said_when_it_is_checked() {
+    let folder = TempDir::new().unwrap();
+    let text = pilotage::scenario::builtin("corridor-unbounded").unwrap();
+    let usual = printed(folder.path(), &["check", "corridor-unbounded"]);
+    assert!(!usual.contains("readings") && !usual.contains("clock"));
+    let changed = text.replacen("[sensor]", "[sensor]\npresent = 0.9", 1)
+        + "\n[[later]]\nfrom = 7\nsensor = { present = 0.5 }\n";
+    fs::write(folder.path().join("changed.toml"), changed).unwrap();
+    let said = printed(folder.path(), &["check", "changed.toml"]);
+    for line in [
+        "  readings  come with probability 0.9, later 0.5\n",
+        "  clock     it matters which step of an episode it is, up to step 7\n",
+    ] {
+        assert!(said.contains(line), "{said}");
+    }
+}
