@@ -11,6 +11,7 @@ use std::process::{Command, Stdio};
 
 use common::automata::any_automaton;
 use common::scenario;
+use pilotage::belief::Reading;
 use pilotage::model::Then;
 use pilotage::policy::{Automaton, AutomatonRunner};
 use pilotage::progress::Silent;
@@ -44,8 +45,15 @@ struct Row {
     action: String,
 }
 
-/// What follows a step: a reading, or a new episode.
-type Event = Option<Vec<f64>>;
+/// What follows a step.
+#[derive(Debug, Clone, PartialEq)]
+enum Event {
+    Sensed(Vec<f64>),
+    /// The reading is missing.
+    Silence,
+    /// A new episode.
+    Start,
+}
 
 /// The rows of the library's own runner.
 fn run(automaton: &Automaton, events: &[Event]) -> Vec<Row> {
@@ -65,8 +73,9 @@ fn run(automaton: &Automaton, events: &[Event]) -> Vec<Row> {
     let mut rows = vec![first];
     for event in events {
         match event {
-            Some(reading) => controller.observe(action, reading),
-            None => controller.reset(),
+            Event::Sensed(reading) => controller.observe(action, reading),
+            Event::Silence => controller.observe(action, Reading::Nothing),
+            Event::Start => controller.reset(),
         }
         let (next, decided) = row(&controller);
         rows.push(next);
@@ -96,11 +105,12 @@ fn run_page(automaton: &Automaton, events: &[Event]) -> Option<String> {
     let mut readings = String::new();
     for event in events {
         let line = match event {
-            Some(reading) => {
+            Event::Sensed(reading) => {
                 let numbers: Vec<String> = reading.iter().map(f64::to_string).collect();
                 numbers.join(",")
             }
-            None => "start".to_owned(),
+            Event::Silence => "nothing".to_owned(),
+            Event::Start => "start".to_owned(),
         };
         readings.push_str(&line);
         readings.push('\n');
@@ -151,7 +161,7 @@ fn compare(automaton: &Automaton, events: &[Event]) {
     }
 }
 
-/// What the world of a scenario lets an automaton sense in so many steps.
+/// What the world of a scenario lets an automaton sense in so many steps, of which every seventh reading is lost on the way.
 fn events(scenario: &Scenario, automaton: &Automaton, steps: usize) -> Vec<Event> {
     let mut world = ProblemWorld::new(scenario);
     let mut controller = AutomatonRunner::new(automaton);
@@ -171,10 +181,14 @@ fn events(scenario: &Scenario, automaton: &Automaton, steps: usize) -> Vec<Event
         }
         if over || step.then == Then::Restart {
             controller.reset();
-            events.push(None);
+            events.push(Event::Start);
         } else {
+            if events.len() % 7 == 6 {
+                observation.silence();
+            }
             controller.observe(action, observation.reading());
-            events.push(Some(observation.reading().values().unwrap().to_vec()));
+            let sensed = observation.reading().values();
+            events.push(sensed.map_or(Event::Silence, |values| Event::Sensed(values.to_vec())));
         }
     }
     events
@@ -228,15 +242,58 @@ fn still() -> Scenario {
     scenario
 }
 
+/// A hallway whose gate opens at step 6, whose floor moves from step 9 on, and whose sensor falls silent now and then.
+fn changing() -> Scenario {
+    let text = r#"
+format = 1
+name = "changing"
+discount = 0.9
+[state]
+names = ["x"]
+modes = ["outside", "inside"]
+bounds = [[0.0, 10.0]]
+[start]
+mean = [1.0]
+covariance = [[0.5]]
+[motion]
+A = [[1.0]]
+noise = [[0.1]]
+[sensor]
+noise = [[0.4]]
+present = 0.8
+[actions]
+FORWARD = { u = [1.0] }
+BACK = { u = [-1.0] }
+STAY = {}
+[[later]]
+from = 9
+motion = { A = [[0.9]], B = [[1.5]] }
+sensor = { H = [[2.0]], present = 1.0 }
+[[event]]
+action = "STAY"
+mode = "outside"
+in = { x = [3.0, 10.0] }
+steps = { from = 6, until = 30 }
+becomes = "inside"
+[[reward]]
+mode = "inside"
+value = 1.0
+[belief]
+level_limit = 20
+"#;
+    pilotage::scenario::read(text, "changing.toml").unwrap()
+}
+
 /// One of everything that a file can say, found on the way.
 #[test]
 fn the_page_runs_policies_as_the_library_does() {
     use Form::{Nearest, Segments};
-    let mut said = [false; 8];
+    let mut said = [false; 11];
     for (scenario, kind, form) in [
         (scenario("corridor"), "value-iteration", Nearest),
         (scenario("corridor-declare"), "value-iteration", Segments),
         (still(), "value-iteration", Nearest),
+        (changing(), "value-iteration", Nearest),
         (scenario("tiger"), "value-iteration", Nearest),
         (scenario("load-unload"), "value-iteration", Nearest),
         (scenario("shuttle"), "value-iteration", Segments),
@@ -268,11 +325,18 @@ fn the_page_runs_policies_as_the_library_does() {
                 .unwrap()
                 .iter()
                 .any(|c| *c != 0),
+            policy["filter"]["later"].is_array(),
+            policy["filter"]["levels"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .any(|level| level["time"] == 9),
+            policy["memory"]["switches"][0]["steps"] == serde_json::json!([6, 30]),
         ]) {
             *said |= says;
         }
     }
-    assert_eq!(said, [true; 8]);
+    assert_eq!(said, [true; 11]);
 }
 
 proptest! {
@@ -289,7 +353,11 @@ proptest! {
             .map(|step| {
                 let spread = if step % 9 == 0 { 1e3 } else { 1.5 };
                 let reading = (0..automaton.filter.readings()).map(|_| 1.0 + spread * normal(&mut rng));
-                (step % 50 != 49).then(|| reading.collect())
+                match step % 50 {
+                    49 => Event::Start,
+                    7 | 31 => Event::Silence,
+                    _ => Event::Sensed(reading.collect()),
+                }
             })
             .collect();
         compare(&automaton, &events);
@@ -301,7 +369,7 @@ proptest! {
 fn the_example_of_the_page_is_true() {
     let page = page();
     let automaton = Automaton::from_json(&block(&page, "json"), "docs/policy-format.md").unwrap();
-    let events = [Some(vec![2.0]), Some(vec![3.0]), Some(vec![2.5])];
+    let events = [2.0, 3.0, 2.5].map(|reading| Event::Sensed(vec![reading]));
     let says = block(&page, "csv");
     assert_eq!(rows(&says, 1), run(&automaton, &events));
     if let Some(csv) = run_page(&automaton, &events) {

@@ -22,21 +22,6 @@ const MOST_NUMBERS: usize = 1 << 26;
 /// missing. Such levels are one if no entry differs by more than this share of the smallest variance.
 const ALIKE: f64 = 0.01;
 
-/// How far the entries of a covariance may be from those of a level that it belongs to.
-fn tolerance(model: &Model, covariance: &DMatrix<f64>) -> f64 {
-    let stated = model.belief.level_tolerance;
-    if !model.misses_readings() {
-        return stated;
-    }
-    let variances = covariance.diagonal();
-    let uncertain = variances.iter().filter(|variance| **variance > 0.0);
-    let least = uncertain.fold(f64::INFINITY, |least, variance| least.min(*variance));
-    match least.is_finite() {
-        true => stated.max(ALIKE * least),
-        false => stated,
-    }
-}
-
 /// Index of a stratum: everything about a belief but its mode and its mean, one of finitely many. For a linear model it is an uncertainty
 /// level.
 pub type StratumId = usize;
@@ -198,6 +183,23 @@ impl LevelGraph {
         }
     }
 
+    /// How far the entries of a covariance may be from those of a level that it belongs to, at a time.
+    fn tolerance(&self, model: &Model, covariance: &DMatrix<f64>, time: usize) -> f64 {
+        let stated = model.belief.level_tolerance;
+        let past = |step: usize| step < time || time == self.clock;
+        let mut phases = model.phases();
+        if !phases.any(|step| past(step) && model.sensor_at(step).present < 1.0) {
+            return stated;
+        }
+        let variances = covariance.diagonal();
+        let uncertain = variances.iter().filter(|variance| **variance > 0.0);
+        let least = uncertain.fold(f64::INFINITY, |least, variance| least.min(*variance));
+        match least.is_finite() {
+            true => stated.max(ALIKE * least),
+            false => stated,
+        }
+    }
+
     /// The level at a time with a covariance, a new one where there is none; the closest, and true, where there is no room.
     fn reach(
         &mut self,
@@ -206,7 +208,7 @@ impl LevelGraph {
         covariance: &DMatrix<f64>,
         time: usize,
     ) -> (StratumId, bool) {
-        match self.nearest(covariance, tolerance(model, covariance), time) {
+        match self.nearest(covariance, self.tolerance(model, covariance, time), time) {
             Some(found) => (found, false),
             None if self.has_room(model, time) => (self.add(covariance.clone(), time), false),
             None => {
@@ -247,7 +249,7 @@ impl LevelGraph {
             return (level, false);
         }
         let time = (self.times[level] + 1).min(self.clock);
-        match self.nearest(covariance, tolerance(model, covariance), time) {
+        match self.nearest(covariance, self.tolerance(model, covariance, time), time) {
             Some(found) if found == level && !self.settled[level] => {
                 (self.settle(model, class, covariance), false)
             }
