@@ -6,11 +6,11 @@
 //! nothing of schemes draw the light one.
 //!
 //! ```
-//! use pilotage::{model, progress::Silent};
+//! use pilotage::{progress::Silent, scenario};
 //! use pilotage::solve::{Request, ValueIteration, plan};
 //! use pilotage_report::automaton_svg;
 //!
-//! let corridor = model::find("corridor-unbounded")?;
+//! let corridor = scenario::find("corridor-unbounded")?;
 //! let solution = plan(&ValueIteration::default(), &corridor.model, &Request::default(), &Silent)?;
 //! let automaton = solution.automaton().expect("the default form is an automaton");
 //! assert!(automaton_svg(automaton)?.contains("EAST"));

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use pilotage::belief::{BeliefMdp, Reading};
+use pilotage::model::{Clause, ModelBuilder, Phase, Sensor};
 use pilotage::policy::{Automaton, AutomatonRunner};
 use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
@@ -327,6 +328,22 @@ fn what_makes_no_sense_is_an_error_at_its_place() {
             "A",
         ),
         ("\n[[reward]]", "\n[[later]]\nform = 1\n[[reward]]", "form"),
+        // What would never happen, and what nobody could tell apart.
+        (
+            "\n[[reward]]",
+            "\n[[later]]\nfrom = 100\n[[reward]]",
+            "from",
+        ),
+        (
+            "value = 1.0",
+            "value = 1.0\nsteps = { from = 1000000000 }",
+            "from",
+        ),
+        (
+            "\n[[reward]]",
+            "\n[episode]\nlength = 2000000000\n[[later]]\nfrom = 1000000000\n[[reward]]",
+            "length",
+        ),
     ];
     for (from, to, place) in cases {
         let text = HALLWAY.replacen(from, to, 1);
@@ -367,4 +384,39 @@ fn solvers_that_know_one_sensor_refuse_others() {
             }
         }
     }
+}
+
+/// What a program builds is what a file says.
+#[test]
+fn the_builder_says_the_same() {
+    let scenario = hallway(&[
+        ("noise = [[0.4]]", "noise = [[0.4]]\npresent = 0.7"),
+        (
+            "\n[[reward]]",
+            "\n[[later]]\nfrom = 4\nsensor = { noise = [[3.0]] }\n[[reward]]",
+        ),
+    ]);
+    let model = &scenario.model;
+    let phase = Phase {
+        from: 4,
+        motion: model.motion.clone(),
+        sensor: Sensor {
+            noise: nalgebra::dmatrix![3.0],
+            ..model.sensor.clone()
+        },
+    };
+    let built = ModelBuilder::new("hallway", 0.9)
+        .variable("x", 0.0, 10.0)
+        .start(&[1.0], &[0.5])
+        .motion(&[1.0], &[1.0], &[0.1])
+        .sensor(&[1.0], &[0.4])
+        .present(0.7)
+        .later(phase)
+        .action("FORWARD", &[1.0])
+        .action("BACK", &[-1.0])
+        .action("STAY", &[0.0])
+        .reward(1.0, Clause::new().within("x", 6.0, 7.0))
+        .build()
+        .unwrap();
+    assert_eq!(&built, model);
 }

@@ -27,6 +27,8 @@ pub struct BeliefMdp {
     /// What a step can do, by its time up to the model's clock, then mode and action. Regions are as the belief reads them: pushed
     /// beyond the walls it knows of, without those in places where no state can be, and events apart.
     effects: Vec<Vec<Vec<Vec<Effect>>>>,
+    /// The steps from which on effects are others, 0 first.
+    turns: Vec<usize>,
     /// The start hypotheses, where one filter keeps them all.
     mixture: Option<Mixture>,
 }
@@ -108,8 +110,10 @@ impl BeliefMdp {
             };
             (0..model.modes.len()).map(of_mode).collect()
         };
+        let turns = model.turns();
         Self {
-            effects: (0..=model.clock()).map(effects).collect(),
+            effects: turns.iter().map(|step| effects(*step)).collect(),
+            turns,
             model: model.clone(),
             levels,
             starts,
@@ -233,8 +237,9 @@ impl BeliefMdp {
 
     /// What an action can do in a mode at a level, with regions as the belief reads them.
     pub fn effects(&self, mode: ModeId, level: StratumId, action: ActionId) -> &[Effect] {
-        let time = self.levels.time(level).min(self.effects.len() - 1);
-        &self.effects[time][mode][action]
+        let time = self.levels.time(level);
+        let turn = self.turns.partition_point(|step| *step <= time) - 1;
+        &self.effects[turn][mode][action]
     }
 
     /// Probability that the true state lies in the region (Eq. 5.2, exact).

@@ -170,12 +170,25 @@ impl Model {
         }
     }
 
-    /// The first step of an episode from which on nothing in the model changes any more with the step; 0 where nothing ever does.
+    /// The first step of an episode from which on nothing in the model changes any more with the step; 0 where nothing ever does. What
+    /// would change after the last step of an episode does not count.
     pub fn clock(&self) -> usize {
+        let last = self.turns().into_iter().max().unwrap_or(0);
+        last.min(self.episode.length)
+    }
+
+    /// The steps from which on something is different from before, in rising order, 0 among them.
+    pub(crate) fn turns(&self) -> Vec<usize> {
         let rewards = self.rewards.iter().map(|term| term.steps);
         let steps = rewards.chain(self.events.iter().map(|event| event.steps));
-        let settled = steps.map(|steps| steps.settled());
-        settled.chain(self.phases()).max().unwrap_or(0)
+        let ends = steps.flat_map(|steps| [steps.from, steps.until]);
+        let mut turns: Vec<usize> = ends
+            .filter(|step| *step != usize::MAX)
+            .chain(self.phases())
+            .collect();
+        turns.sort_unstable();
+        turns.dedup();
+        turns
     }
 
     /// Whether anything leads back to the start.

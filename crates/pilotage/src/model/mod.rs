@@ -210,14 +210,6 @@ impl Steps {
     pub fn contains(&self, step: usize) -> bool {
         self.from <= step && step < self.until
     }
-
-    /// The first step from which on nothing changes any more.
-    fn settled(&self) -> usize {
-        match self.until {
-            usize::MAX => self.from,
-            until => until,
-        }
-    }
 }
 
 impl Default for Steps {

@@ -17,7 +17,7 @@ pub(crate) const MOST_DIMENSIONS: usize = 64;
 const MOST_NAMES: usize = 1000;
 
 /// Most uncertainty levels.
-const MOST_LEVELS: usize = 100_000;
+pub(crate) const MOST_LEVELS: usize = 100_000;
 
 /// Weights of hypotheses may miss 1 by this much, which decimals such as 0.333333333 need.
 const WEIGHT_TOLERANCE: f64 = 1e-6;
@@ -49,12 +49,14 @@ impl Model {
         for (i, reward) in self.rewards.iter().enumerate() {
             let path = Path::new("reward").index(i);
             self.check_condition(&reward.actions, reward.mode, &reward.region, &path)?;
+            self.check_begins(reward.steps.from, path.clone().key("steps").key("from"))?;
             finite(reward.value, path.key("value"))?;
         }
         for (i, event) in self.events.iter().enumerate() {
             let path = Path::new("event").index(i);
             self.check_condition(&event.actions, event.mode, &event.region, &path)?;
             self.check_mode(event.becomes, path.clone().key("becomes"))?;
+            self.check_begins(event.steps.from, path.clone().key("steps").key("from"))?;
             finite(event.reward, path.key("reward"))?;
         }
         self.check_cost()?;
@@ -133,11 +135,27 @@ impl Model {
                     "give steps that rise, the first at least 1",
                 ));
             }
+            self.check_begins(phase.from, path.clone().key("from"))?;
             before = phase.from;
             self.check_motion(&phase.motion, path.clone().key("motion"))?;
             self.check_sensor(&phase.sensor, path.key("sensor"))?;
         }
         Ok(())
+    }
+
+    /// What begins after the last step of an episode would be ignored without a word.
+    fn check_begins(&self, step: usize, path: Path) -> Result<(), Fault> {
+        match step < self.episode.length {
+            true => Ok(()),
+            false => Err(Fault::new(
+                path,
+                format!(
+                    "it begins at step {step}, and an episode is over after {}",
+                    self.episode.length
+                ),
+                "begin earlier, counted from 0, or give a longer `episode.length`",
+            )),
+        }
     }
 
     fn check_motion(&self, motion: &Motion, path: Path) -> Result<(), Fault> {
@@ -377,6 +395,16 @@ impl Model {
             ));
         }
         finite(self.episode.failure_reward, path("failure_reward"))?;
+        let clock = self.clock();
+        if clock > MOST_LEVELS {
+            return Err(Fault::new(
+                path("length"),
+                format!(
+                    "something changes up to step {clock} of an episode, and at most {MOST_LEVELS} steps are told apart"
+                ),
+                "give a shorter episode, or smaller steps to `steps` and `later`",
+            ));
+        }
         self.check_region(&self.episode.alive, path("alive"))
     }
 

@@ -23,6 +23,8 @@ pub struct ProblemWorld {
     walls: Option<Barriers>,
     /// What a step can do, by step up to the model's clock, then mode and action.
     effects: Vec<Vec<Vec<Vec<Effect>>>>,
+    /// The steps from which on effects are others, 0 first.
+    turns: Vec<usize>,
     state: Vec<f64>,
     scratch: Vec<f64>,
     mode: ModeId,
@@ -50,11 +52,13 @@ impl ProblemWorld {
             };
             (0..model.modes.len()).map(of_mode).collect()
         };
+        let turns = model.turns();
         Self {
             starts: scenario.start().iter().map(start).collect(),
             body,
             walls: (truth.walls == Walls::Clamp).then(|| Barriers::new(model)),
-            effects: (0..=model.clock()).map(effects).collect(),
+            effects: turns.iter().map(|step| effects(*step)).collect(),
+            turns,
             state: model.start[0].mean.as_slice().to_vec(),
             scratch: vec![0.0; model.state_dim()],
             mode: model.start[0].mode,
@@ -100,7 +104,8 @@ impl ProblemWorld {
 
     /// Takes in what the step does in the current state; what has happened, if an event has.
     fn see(&self, when: When, doing: (ModeId, ActionId), tally: &mut Tally) -> Option<Outcome> {
-        let effects = &self.effects[self.time.min(self.effects.len() - 1)][doing.0][doing.1];
+        let turn = self.turns.partition_point(|step| *step <= self.time) - 1;
+        let effects = &self.effects[turn][doing.0][doing.1];
         let now = effects.iter().filter(|effect| effect.when == when);
         tally.see(now, &self.state)
     }

@@ -5,9 +5,11 @@
 //! difference matters, the plan is made anew with strata that tell the time, so that it may do something else near the end; if not, the
 //! actions stay as they are and only the promise is that of the episode.
 
+use super::SOLVER;
 use super::grid_policy::{Average, Backup, GridPolicy, iterate};
 use crate::belief::BeliefMdp;
 use crate::error::{Error, Result};
+use crate::model::validate::MOST_LEVELS;
 use crate::policy::first_best;
 use crate::progress::Progress;
 use crate::solve::grid::Settings;
@@ -52,6 +54,9 @@ pub(super) fn plan(
         return Ok(policy);
     }
     let why = match telling_time(mdp).and_then(|told| iterate(&told, settings, observer)) {
+        Err(Error::Unsupported { .. }) if length > MOST_LEVELS => {
+            format!("no plan tells the time of more than {MOST_LEVELS} steps")
+        }
         Err(Error::TooManyLevels { levels, .. }) => {
             format!("levels that tell the time are more than the {levels} there is room for")
         }
@@ -70,7 +75,17 @@ pub(super) fn plan(
 
 /// The decision process whose levels tell the time up to the end of an episode.
 fn telling_time(mdp: &BeliefMdp) -> Result<BeliefMdp> {
-    let told = BeliefMdp::with_horizon(mdp.model(), mdp.model().episode.length);
+    let length = mdp.model().episode.length;
+    if length > MOST_LEVELS {
+        return Err(Error::Unsupported {
+            solver: SOLVER,
+            model: mdp.model().name.clone(),
+            reason: format!(
+                "its plan has to tell the time of an episode of {length} steps, and can up to {MOST_LEVELS}; give a shorter `episode.length`, or a discount below 1"
+            ),
+        });
+    }
+    let told = BeliefMdp::with_horizon(mdp.model(), length);
     told.check()?;
     Ok(told)
 }
