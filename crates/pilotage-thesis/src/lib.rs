@@ -12,7 +12,7 @@
 //!
 //! let context = Context { seed: 1, quick: true, observer: &Silent };
 //! let levels = EXPERIMENTS.iter().find(|experiment| experiment.id == "table-4.1").expect("listed");
-//! assert_eq!((levels.make)(&context)?.verdict, Verdict::UnderReading);
+//! assert_eq!((levels.make)(&context)?.verdict, Verdict::Reproduced);
 //! # Ok::<(), pilotage_thesis::Error>(())
 //! ```
 
