@@ -2,6 +2,9 @@
 //! does it, the filter follows, and the plan counts on it.
 #![allow(clippy::unwrap_used)]
 
+mod common;
+
+use common::{HALLWAY, hallway};
 use pilotage::belief::{BeliefMdp, Reading};
 use pilotage::model::{Clause, ModelBuilder, Phase, Sensor};
 use pilotage::policy::{Automaton, AutomatonRunner};
@@ -10,38 +13,6 @@ use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Options;
 use pilotage::solve::{Form, Request, Solution, ValueIteration, plan};
 use pilotage::world::{Observation, ProblemWorld, Streams, World};
-
-const HALLWAY: &str = r#"
-format = 1
-name = "hallway"
-discount = 0.9
-[state]
-names = ["x"]
-bounds = [[0.0, 10.0]]
-[start]
-mean = [1.0]
-covariance = [[0.5]]
-[motion]
-A = [[1.0]]
-noise = [[0.1]]
-[sensor]
-noise = [[0.4]]
-[actions]
-FORWARD = { u = [1.0] }
-BACK = { u = [-1.0] }
-STAY = {}
-[[reward]]
-in = { x = [6.0, 7.0] }
-value = 1.0
-"#;
-
-fn hallway(changes: &[(&str, &str)]) -> Scenario {
-    let text = changes.iter().fold(HALLWAY.to_owned(), |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replace(from, to)
-    });
-    scenario::read(&text, "hallway.toml").unwrap_or_else(|error| panic!("{error}"))
-}
 
 fn solved(scenario: &Scenario, form: Form) -> Solution {
     plan(

@@ -244,27 +244,7 @@ fn still() -> Scenario {
 
 /// A hallway whose gate opens at step 6, whose floor moves from step 9 on, and whose sensor falls silent now and then.
 fn changing() -> Scenario {
-    let text = r#"
-format = 1
-name = "changing"
-discount = 0.9
-[state]
-names = ["x"]
-modes = ["outside", "inside"]
-bounds = [[0.0, 10.0]]
-[start]
-mean = [1.0]
-covariance = [[0.5]]
-[motion]
-A = [[1.0]]
-noise = [[0.1]]
-[sensor]
-noise = [[0.4]]
-present = 0.8
-[actions]
-FORWARD = { u = [1.0] }
-BACK = { u = [-1.0] }
-STAY = {}
+    let later = r#"
 [[later]]
 from = 9
 motion = { A = [[0.9]], B = [[1.5]] }
@@ -275,13 +255,16 @@ mode = "outside"
 in = { x = [3.0, 10.0] }
 steps = { from = 6, until = 30 }
 becomes = "inside"
-[[reward]]
-mode = "inside"
-value = 1.0
 [belief]
 level_limit = 20
+[[reward]]
+mode = "inside"
 "#;
-    pilotage::scenario::read(text, "changing.toml").unwrap()
+    common::hallway(&[
+        ("bounds =", "modes = [\"outside\", \"inside\"]\nbounds ="),
+        ("noise = [[0.4]]", "noise = [[0.4]]\npresent = 0.8"),
+        ("\n[[reward]]\nin = { x = [6.0, 7.0] }\n", later),
+    ])
 }
 
 /// One of everything that a file can say, found on the way.

@@ -1,6 +1,9 @@
 //! What a plan promises is what it earns where its model holds, or it says why not; what cannot be planned for is an error.
 #![allow(clippy::unwrap_used)]
 
+mod common;
+
+use common::hallway;
 use pilotage::belief::BeliefMdp;
 use pilotage::model::{Model, Steps};
 use pilotage::progress::Silent;
@@ -8,39 +11,6 @@ use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Options;
 use pilotage::solve::value_iteration::Settings;
 use pilotage::solve::{Earned, Form, Request, Solution, ValueIteration, plan};
-
-/// A hallway, to be changed by each test.
-const HALLWAY: &str = r#"
-format = 1
-name = "hallway"
-discount = 0.9
-[state]
-names = ["x"]
-bounds = [[0.0, 10.0]]
-[start]
-mean = [1.0]
-covariance = [[0.5]]
-[motion]
-A = [[1.0]]
-noise = [[0.1]]
-[sensor]
-noise = [[0.4]]
-[actions]
-FORWARD = { u = [1.0] }
-BACK = { u = [-1.0] }
-STAY = {}
-[[reward]]
-in = { x = [6.0, 7.0] }
-value = 1.0
-"#;
-
-fn hallway(changes: &[(&str, &str)]) -> Scenario {
-    let text = changes.iter().fold(HALLWAY.to_owned(), |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replace(from, to)
-    });
-    scenario::read(&text, "hallway.toml").unwrap_or_else(|error| panic!("{error}"))
-}
 
 fn planned(scenario: &Scenario, form: Form) -> pilotage::Result<Solution> {
     let request = Request::form(form);

@@ -94,7 +94,7 @@ impl Filter {
             for action in 0..actions {
                 let step = levels.step(level, levels.class_of(action));
                 next.push(step.next);
-                blind.push(step.blind.next);
+                blind.push(step.blind);
                 gains.extend(step.correction.gain.iter());
             }
         }

@@ -210,39 +210,6 @@ impl<'a> HypothesisTracker<'a> {
         &self.live[(0..self.live.len()).fold(0, heavier)]
     }
 
-    /// Moves all hypotheses on by an action and what was sensed after it, weighs them by the density of their own innovation
-    /// (Eq. 5.16), prunes and merges. Nothing sensed speaks for none of them.
-    fn step(&mut self, action: ActionId, reading: Reading<'_>) {
-        let mut best = f64::NEG_INFINITY;
-        for hypothesis in &mut self.live {
-            let belief = &mut hypothesis.belief;
-            // Logarithms, because every density may be too small for a number.
-            hypothesis.weight = hypothesis.weight.ln();
-            if let Reading::Values(observation) = reading {
-                self.filter.predict(belief, action, &mut self.scratch);
-                let values = self.innovation.iter_mut().zip(observation).enumerate();
-                for (reading, (value, observed)) in values {
-                    let expected = self.filter.expected_reading(belief, &self.scratch, reading);
-                    *value = observed - expected;
-                }
-                let density = &self.densities[belief.stratum * self.actions + action];
-                hypothesis.weight += density.log(&self.innovation);
-            }
-            best = best.max(hypothesis.weight);
-            self.filter
-                .update(belief, action, reading, &mut self.scratch);
-        }
-        for hypothesis in &mut self.live {
-            hypothesis.weight = (hypothesis.weight - best).exp();
-        }
-        self.normalise();
-        let (prune, most) = (self.settings.prune, self.heaviest().weight);
-        self.live
-            .retain(|hypothesis| hypothesis.weight >= prune.min(most));
-        self.merge();
-        self.normalise();
-    }
-
     fn normalise(&mut self) {
         let total: f64 = self.live.iter().map(|hypothesis| hypothesis.weight).sum();
         for hypothesis in &mut self.live {
@@ -296,8 +263,37 @@ impl Tracker for HypothesisTracker<'_> {
         self.live.clone_from(&self.starts);
     }
 
+    /// Moves all hypotheses on by an action and what was sensed after it, weighs them by the density of their own innovation
+    /// (Eq. 5.16), prunes and merges. Nothing sensed speaks for none of them.
     fn update(&mut self, action: ActionId, reading: Reading<'_>) {
-        self.step(action, reading);
+        let mut best = f64::NEG_INFINITY;
+        for hypothesis in &mut self.live {
+            let belief = &mut hypothesis.belief;
+            // Logarithms, because every density may be too small for a number.
+            hypothesis.weight = hypothesis.weight.ln();
+            if let Reading::Values(observation) = reading {
+                self.filter.predict(belief, action, &mut self.scratch);
+                let values = self.innovation.iter_mut().zip(observation).enumerate();
+                for (reading, (value, observed)) in values {
+                    let expected = self.filter.expected_reading(belief, &self.scratch, reading);
+                    *value = observed - expected;
+                }
+                let density = &self.densities[belief.stratum * self.actions + action];
+                hypothesis.weight += density.log(&self.innovation);
+            }
+            best = best.max(hypothesis.weight);
+            self.filter
+                .update(belief, action, reading, &mut self.scratch);
+        }
+        for hypothesis in &mut self.live {
+            hypothesis.weight = (hypothesis.weight - best).exp();
+        }
+        self.normalise();
+        let (prune, most) = (self.settings.prune, self.heaviest().weight);
+        self.live
+            .retain(|hypothesis| hypothesis.weight >= prune.min(most));
+        self.merge();
+        self.normalise();
     }
 
     fn belief(&self) -> &Belief {

@@ -35,20 +35,10 @@ pub struct LevelStep {
     pub next: StratumId,
     /// Whether there was no room for the level it should lead to, and `next` is the closest there is.
     pub cut: bool,
-    /// Where it leads if the reading is missing.
-    pub blind: BlindStep,
+    /// The level it leads to if the reading is missing; only the closest there is where the model's readings always come.
+    pub blind: StratumId,
     /// Gain, innovation covariance and the rest of the step.
     pub correction: Correction,
-}
-
-/// Where a step leads after which nothing is sensed, to what the prediction leaves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BlindStep {
-    /// The level it leads to.
-    pub next: StratumId,
-    /// Whether `next` is only the closest level there is. So it is where the model's readings always come, and one is missing all the
-    /// same.
-    pub cut: bool,
 }
 
 /// All levels that can be reached, and how.
@@ -166,14 +156,11 @@ impl LevelGraph {
             &self.covariances[level],
         );
         let (next, cut) = self.lead(model, level, class, &correction.covariance);
-        let mut blind = BlindStep {
-            next: level,
-            cut: false,
-        };
+        let mut blind = level;
         // Where readings always come, the closest level is found once all are known.
         if model.sensor_at(time).present < 1.0 && !self.is_over(level) {
             let time = (time + 1).min(self.clock);
-            (blind.next, blind.cut) = self.reach(model, level, &correction.predicted, time);
+            blind = self.reach(model, level, &correction.predicted, time).0;
         }
         LevelStep {
             next,
@@ -229,10 +216,7 @@ impl LevelGraph {
             for class in 0..self.classes.len() {
                 let predicted = &self.steps[level][class].correction.predicted;
                 let closest = self.closest(predicted, time);
-                self.steps[level][class].blind = BlindStep {
-                    next: closest.unwrap_or(level),
-                    cut: true,
-                };
+                self.steps[level][class].blind = closest.unwrap_or(level);
             }
         }
     }
@@ -249,11 +233,11 @@ impl LevelGraph {
             return (level, false);
         }
         let time = (self.times[level] + 1).min(self.clock);
-        match self.nearest(covariance, self.tolerance(model, covariance, time), time) {
-            Some(found) if found == level && !self.settled[level] => {
+        match self.reach(model, level, covariance, time) {
+            (found, false) if found == level && !self.settled[level] => {
                 (self.settle(model, class, covariance), false)
             }
-            _ => self.reach(model, level, covariance, time),
+            reached => reached,
         }
     }
 

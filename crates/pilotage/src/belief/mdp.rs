@@ -12,8 +12,8 @@ use super::levels::{ClassId, LevelGraph, StratumId};
 use super::mixture::Mixture;
 use crate::error::Result;
 use crate::model::{
-    ActionId, Barriers, Effect, HypothesisBelief, Interval, Map, ModeId, Model, Outcome, Region,
-    Then, WallBelief, When, apart,
+    ActionId, Barriers, Effect, EffectTable, HypothesisBelief, Interval, Map, ModeId, Model,
+    Outcome, Region, Then, WallBelief, When, apart,
 };
 
 /// A model together with its uncertainty levels and the way a belief is read.
@@ -24,11 +24,9 @@ pub struct BeliefMdp {
     starts: Vec<(f64, Belief)>,
     walls: Option<Barriers>,
     reading: Reading,
-    /// What a step can do, by its time up to the model's clock, then mode and action. Regions are as the belief reads them: pushed
+    /// What a step can do. Regions are as the belief reads them: pushed
     /// beyond the walls it knows of, without those in places where no state can be, and events apart.
-    effects: Vec<Vec<Vec<Vec<Effect>>>>,
-    /// The steps from which on effects are others, 0 first.
-    turns: Vec<usize>,
+    effects: EffectTable,
     /// The start hypotheses, where one filter keeps them all.
     mixture: Option<Mixture>,
 }
@@ -98,22 +96,10 @@ impl BeliefMdp {
             }),
             _ => Some(effect),
         };
-        let effects = |time| {
-            let of = |mode, action| {
-                let effects = model.effects(mode, action, time);
-                apart(effects.into_iter().filter_map(read).collect())
-            };
-            let of_mode = |mode| {
-                (0..model.actions.len())
-                    .map(|action| of(mode, action))
-                    .collect()
-            };
-            (0..model.modes.len()).map(of_mode).collect()
-        };
-        let turns = model.turns();
         Self {
-            effects: turns.iter().map(|step| effects(*step)).collect(),
-            turns,
+            effects: EffectTable::new(model, |effects| {
+                apart(effects.into_iter().filter_map(read).collect())
+            }),
             model: model.clone(),
             levels,
             starts,
@@ -165,7 +151,7 @@ impl BeliefMdp {
 
     /// The stratum after a step of a class whose reading is missing.
     pub fn next_blind(&self, stratum: StratumId, class: ClassId) -> StratumId {
-        self.levels.step(stratum, class).blind.next
+        self.levels.step(stratum, class).blind
     }
 
     /// Probability that there is a reading after a step from a stratum.
@@ -237,9 +223,7 @@ impl BeliefMdp {
 
     /// What an action can do in a mode at a level, with regions as the belief reads them.
     pub fn effects(&self, mode: ModeId, level: StratumId, action: ActionId) -> &[Effect] {
-        let time = self.levels.time(level);
-        let turn = self.turns.partition_point(|step| *step <= time) - 1;
-        &self.effects[turn][mode][action]
+        self.effects.at(self.levels.time(level), mode, action)
     }
 
     /// Probability that the true state lies in the region (Eq. 5.2, exact).

@@ -178,7 +178,7 @@ impl Model {
     }
 
     /// The steps from which on something is different from before, in rising order, 0 among them.
-    pub(crate) fn turns(&self) -> Vec<usize> {
+    fn turns(&self) -> Vec<usize> {
         let rewards = self.rewards.iter().map(|term| term.steps);
         let steps = rewards.chain(self.events.iter().map(|event| event.steps));
         let ends = steps.flat_map(|steps| [steps.from, steps.until]);
@@ -208,6 +208,36 @@ fn quadratic(weights: &DMatrix<f64>, mean: &[f64], covariance: Option<&DMatrix<f
         weights[(i, j)] * (mean[i] * mean[j] + spread)
     };
     pairs.map(of).sum()
+}
+
+/// The effects of a model by step, mode and action, kept once for all steps between which nothing changes.
+#[derive(Debug, Clone)]
+pub(crate) struct EffectTable {
+    /// The steps from which on effects are others, 0 first.
+    turns: Vec<usize>,
+    /// By turn, mode, action.
+    effects: Vec<Vec<Vec<Vec<Effect>>>>,
+}
+
+impl EffectTable {
+    /// The table of a model, whose effects are `read` by whoever uses it.
+    pub(crate) fn new(model: &Model, read: impl Fn(Vec<Effect>) -> Vec<Effect>) -> Self {
+        let turns = model.turns();
+        let (modes, actions) = (0..model.modes.len(), 0..model.actions.len());
+        let at = |step, mode, action| read(model.effects(mode, action, step));
+        let of_mode = |step, mode| actions.clone().map(|a| at(step, mode, a)).collect();
+        let of_step = |step| modes.clone().map(|mode| of_mode(step, mode)).collect();
+        Self {
+            effects: turns.iter().map(|step| of_step(*step)).collect(),
+            turns,
+        }
+    }
+
+    /// What an action can do in a mode at a step of the episode.
+    pub(crate) fn at(&self, step: usize, mode: ModeId, action: ActionId) -> &[Effect] {
+        let turn = self.turns.partition_point(|turn| *turn <= step) - 1;
+        &self.effects[turn][mode][action]
+    }
 }
 
 /// Splits the regions of events so that no two of the same time overlap: each is left with what comes to it first. Then the

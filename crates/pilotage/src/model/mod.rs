@@ -30,6 +30,7 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use barriers::Barriers;
 pub use builder::{Clause, ModelBuilder};
+pub(crate) use effects::EffectTable;
 pub use effects::{Change, Effect, Outcome, Switch, Tally, apart};
 pub(crate) use error::nearest;
 pub use error::{Fault, ModelError, Path, Place, Step, suggest};

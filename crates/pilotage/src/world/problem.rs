@@ -6,8 +6,8 @@ use super::noise::Noise;
 use super::robot::Driven;
 use super::{Body, Doing, Observation, Step, Streams, World};
 use crate::model::{
-    ActionId, Barriers, Effect, ModeId, Model, Outcome, StartHypothesis, StartShape, Tally, Then,
-    When,
+    ActionId, Barriers, EffectTable, ModeId, Model, Outcome, StartHypothesis, StartShape, Tally,
+    Then, When,
 };
 use crate::random::uniform;
 use crate::scenario::{Scenario, Simulator, Walls};
@@ -21,10 +21,7 @@ pub struct ProblemWorld {
     starts: Vec<(StartHypothesis, Noise)>,
     body: Box<dyn Body>,
     walls: Option<Barriers>,
-    /// What a step can do, by step up to the model's clock, then mode and action.
-    effects: Vec<Vec<Vec<Vec<Effect>>>>,
-    /// The steps from which on effects are others, 0 first.
-    turns: Vec<usize>,
+    effects: EffectTable,
     state: Vec<f64>,
     scratch: Vec<f64>,
     mode: ModeId,
@@ -43,22 +40,11 @@ impl ProblemWorld {
             Simulator::Robot(robot) => Box::new(Driven::new(scenario, robot)),
         };
         let start = |start: &StartHypothesis| (start.clone(), Noise::new(&start.covariance));
-        let effects = |time| {
-            let of_mode = |mode| {
-                let actions = 0..model.actions.len();
-                actions
-                    .map(|action| model.effects(mode, action, time))
-                    .collect()
-            };
-            (0..model.modes.len()).map(of_mode).collect()
-        };
-        let turns = model.turns();
         Self {
             starts: scenario.start().iter().map(start).collect(),
             body,
             walls: (truth.walls == Walls::Clamp).then(|| Barriers::new(model)),
-            effects: turns.iter().map(|step| effects(*step)).collect(),
-            turns,
+            effects: EffectTable::new(model, |effects| effects),
             state: model.start[0].mean.as_slice().to_vec(),
             scratch: vec![0.0; model.state_dim()],
             mode: model.start[0].mode,
@@ -73,9 +59,10 @@ impl ProblemWorld {
         self.hypothesis
     }
 
-    fn doing(&self, mode: ModeId, action: ActionId) -> Doing {
+    /// An action, in the mode and phase of now.
+    fn doing(&self, action: ActionId) -> Doing {
         Doing {
-            mode,
+            mode: self.mode,
             action,
             phase: self.model.phase(self.time),
         }
@@ -103,9 +90,8 @@ impl ProblemWorld {
     }
 
     /// Takes in what the step does in the current state; what has happened, if an event has.
-    fn see(&self, when: When, doing: (ModeId, ActionId), tally: &mut Tally) -> Option<Outcome> {
-        let turn = self.turns.partition_point(|step| *step <= self.time) - 1;
-        let effects = &self.effects[turn][doing.0][doing.1];
+    fn see(&self, when: When, doing: Doing, tally: &mut Tally) -> Option<Outcome> {
+        let effects = self.effects.at(self.time, doing.mode, doing.action);
         let now = effects.iter().filter(|effect| effect.when == when);
         tally.see(now, &self.state)
     }
@@ -167,7 +153,7 @@ impl World for ProblemWorld {
         draws: &mut Streams,
         observation: &mut Observation,
     ) -> Step {
-        let doing = (self.mode, action);
+        let doing = self.doing(action);
         let mut tally = self.model.tally(self.mode, action);
         tally.reward += self.model.running_cost(&self.state, None, action);
         let before = self.see(When::Before, doing, &mut tally);
@@ -176,8 +162,7 @@ impl World for ProblemWorld {
         if outcome.then != Then::Continue {
             return self.close(tally.reward, outcome.then, draws);
         }
-        let moving = self.doing(doing.0, action);
-        self.move_on(moving, draws);
+        self.move_on(doing, draws);
         if !self.model.episode.alive.contains(&self.state) {
             return Step {
                 reward: tally.reward + self.model.episode.failure_reward,
@@ -191,7 +176,7 @@ impl World for ProblemWorld {
                 return self.close(tally.reward, outcome.then, draws);
             }
         }
-        self.sense(moving, draws, observation);
+        self.sense(doing, draws, observation);
         self.time += 1;
         Step {
             reward: tally.reward,

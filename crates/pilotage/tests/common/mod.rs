@@ -189,3 +189,37 @@ pub fn short(form: Form) -> Request {
         ..Request::form(form)
     }
 }
+
+/// A hallway, to be changed by each test.
+pub const HALLWAY: &str = r#"
+format = 1
+name = "hallway"
+discount = 0.9
+[state]
+names = ["x"]
+bounds = [[0.0, 10.0]]
+[start]
+mean = [1.0]
+covariance = [[0.5]]
+[motion]
+A = [[1.0]]
+noise = [[0.1]]
+[sensor]
+noise = [[0.4]]
+[actions]
+FORWARD = { u = [1.0] }
+BACK = { u = [-1.0] }
+STAY = {}
+[[reward]]
+in = { x = [6.0, 7.0] }
+value = 1.0
+"#;
+
+/// The hallway with texts replaced, each of which must be there.
+pub fn hallway(changes: &[(&str, &str)]) -> Scenario {
+    let text = changes.iter().fold(HALLWAY.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
+    scenario::read(&text, "hallway.toml").unwrap_or_else(|error| panic!("{error}"))
+}

@@ -213,11 +213,16 @@ fn resolves(mdp: &BeliefMdp, axes: &[Axis]) -> Result<()> {
     Ok(())
 }
 
+/// Kinds of expectations: after a reading, and after none where one may be missing.
+pub(super) fn kinds(mdp: &BeliefMdp) -> usize {
+    if mdp.model().misses_readings() { 2 } else { 1 }
+}
+
 /// Functions kept on the grid: values, expectations and probabilities of failing.
 fn functions(mdp: &BeliefMdp) -> u64 {
     let (strata, classes) = (mdp.strata(), mdp.classes());
     let limits = usize::from(!mdp.model().episode.alive.sides.is_empty());
-    let expectations = classes * if mdp.model().misses_readings() { 2 } else { 1 };
+    let expectations = classes * kinds(mdp);
     (strata * (mdp.model().modes.len() * (1 + expectations) + limits)) as u64
 }
 

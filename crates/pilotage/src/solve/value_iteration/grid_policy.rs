@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use petgraph::algo::kosaraju_scc;
 use petgraph::graph::{DiGraph, NodeIndex};
 
-use super::extent::{axes, knows_map, mebibytes};
+use super::extent::{axes, kinds, knows_map, mebibytes};
 use crate::belief::{Belief, BeliefMdp, StratumId};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, Outcome, Then};
@@ -90,11 +90,6 @@ pub(super) fn iterate(
         observer.progress("levels", done as u64 + 1, groups.len() as u64);
     }
     Ok(policy)
-}
-
-/// Kinds of expectations: after a reading, and after none where one may be missing.
-fn kinds(mdp: &BeliefMdp) -> usize {
-    if mdp.model().misses_readings() { 2 } else { 1 }
 }
 
 /// Probability of being within the limits at every point, by stratum; empty without limits.
