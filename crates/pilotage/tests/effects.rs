@@ -44,6 +44,8 @@ proptest! {
             region,
             when: When::Before,
             reward: number as f64,
+            formula: None,
+            chance: 1.0,
             change: Some(pilotage::model::Change { mode: number, then: Then::Continue }),
         };
         let effects: Vec<Effect> = regions.into_iter().enumerate().map(event).collect();

@@ -121,6 +121,7 @@ const CHANGES: &[Change<Model>] = &[
         m.state.push(StateVariable {
             name: "z".to_owned(),
             bounds: Interval::ALL,
+            kind: VariableKind::Real,
         });
     }),
     ("state, other order", |m| m.state.swap(0, 1)),
@@ -364,6 +365,7 @@ fn lists_do_not_run_into_each_other() {
         region: Region::everywhere(),
         when: When::Before,
         steps: Steps::ALL,
+        probability: 1.0,
         becomes: None,
         reward: 0.0,
         then: Then::Continue,

@@ -90,6 +90,7 @@ fn rewards_are_looked_at_unless_survival_is_asked_for() {
         when: When::Before,
         steps: Steps::ALL,
         value: 1.0,
+        formula: None,
     }];
     model.episode.alive = Region::new(vec![(0, Interval::new(-6.0, 6.0))]);
     let assumed = Scenario::assumed(&model);

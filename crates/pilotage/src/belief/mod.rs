@@ -12,6 +12,7 @@
 //! each, and [`Recall`] remembers where beliefs were.
 
 mod filter;
+mod full;
 pub mod gaussian;
 mod hypotheses;
 pub(crate) mod kalman;
@@ -26,6 +27,7 @@ mod tracker;
 
 pub(crate) use filter::is_kept;
 pub use filter::{Belief, Filter, LARGEST};
+pub use full::{Acted, Keeping, Moments, Sensed};
 pub use hypotheses::{Hypothesis, HypothesisSettings, HypothesisTracker, Merge};
 pub use kalman::{Correction, KalmanFilter};
 pub use levels::{ClassId, LevelGraph, StratumId};

@@ -39,8 +39,10 @@ pub struct ModelBuilder {
     sensor: [Vec<f64>; 2],
     present: f64,
     later: Vec<Phase>,
+    laws: Laws,
+    drift: Option<Vec<f64>>,
     actions: Vec<Action>,
-    rewards: Vec<(f64, Clause)>,
+    rewards: Vec<(Formula, Clause)>,
     events: Vec<(f64, Change, Clause)>,
     cost: Option<[Vec<f64>; 3]>,
     episode: Episode,
@@ -65,13 +67,27 @@ struct Change {
 }
 
 /// When and where something is paid or happens: everywhere and always, unless it says otherwise.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Clause {
     actions: Vec<String>,
     mode: Option<String>,
     sides: Vec<(String, Interval)>,
     when: When,
     steps: Steps,
+    probability: f64,
+}
+
+impl Default for Clause {
+    fn default() -> Self {
+        Self {
+            actions: Vec::new(),
+            mode: None,
+            sides: Vec::new(),
+            when: When::default(),
+            steps: Steps::ALL,
+            probability: 1.0,
+        }
+    }
 }
 
 impl Clause {
@@ -105,6 +121,12 @@ impl Clause {
         self
     }
 
+    /// With this probability, for an event; 1 unless it is said.
+    pub fn with_probability(mut self, probability: f64) -> Self {
+        self.probability = probability;
+        self
+    }
+
     /// In these steps of an episode alone.
     pub fn during(mut self, steps: Steps) -> Self {
         self.steps = steps;
@@ -126,6 +148,8 @@ impl ModelBuilder {
             sensor: Default::default(),
             present: 1.0,
             later: Vec::new(),
+            laws: Laws::default(),
+            drift: None,
             actions: Vec::new(),
             rewards: Vec::new(),
             events: Vec::new(),
@@ -147,6 +171,7 @@ impl ModelBuilder {
         self.state.push(StateVariable {
             name: name.to_owned(),
             bounds: Interval::new(low, high),
+            kind: VariableKind::Real,
         });
         self
     }
@@ -203,6 +228,32 @@ impl ModelBuilder {
         self
     }
 
+    /// What is added to the state at every step, length `n`.
+    pub fn drift(mut self, drift: &[f64]) -> Self {
+        self.drift = Some(drift.to_vec());
+        self
+    }
+
+    /// What the values of the last variable are; any number unless it is said.
+    pub fn kind(mut self, kind: VariableKind) -> Self {
+        if let Some(variable) = self.state.last_mut() {
+            variable.kind = kind;
+        }
+        self
+    }
+
+    /// Motion and sensing in a mode, on an action, or as formulas; later cases count before earlier ones.
+    pub fn case(mut self, case: Case) -> Self {
+        self.laws.cases.push(case);
+        self
+    }
+
+    /// All that goes beyond linear motion and sensing, instead of what was said of it so far.
+    pub fn laws(mut self, laws: Laws) -> Self {
+        self.laws = laws;
+        self
+    }
+
     /// The next action, with its control (length `p`).
     pub fn action(self, name: &str, control: &[f64]) -> Self {
         self.action_that(Action {
@@ -221,8 +272,13 @@ impl ModelBuilder {
     }
 
     /// A reward.
-    pub fn reward(mut self, value: f64, clause: Clause) -> Self {
-        self.rewards.push((value, clause));
+    pub fn reward(self, value: f64, clause: Clause) -> Self {
+        self.reward_of(Formula::Number(value), clause)
+    }
+
+    /// A reward that depends on the state.
+    pub fn reward_of(mut self, formula: Formula, clause: Clause) -> Self {
+        self.rewards.push((formula, clause));
         self
     }
 
@@ -316,7 +372,8 @@ impl ModelBuilder {
                 region: region(clause, &path.key("in"))?,
                 when: clause.when,
                 steps: clause.steps,
-                value: *value,
+                value: value.constant().unwrap_or(0.0),
+                formula: value.constant().is_none().then(|| value.clone()),
             });
         }
         let mut events = Vec::new();
@@ -329,6 +386,7 @@ impl ModelBuilder {
                 region: region(clause, &path.key("in"))?,
                 when: clause.when,
                 steps: clause.steps,
+                probability: clause.probability,
                 reward: *reward,
                 then: change.then,
             });
@@ -349,9 +407,13 @@ impl ModelBuilder {
             motion: Motion {
                 a: square(a, n, path("motion", "A"))?,
                 noise: square(noise, n, path("motion", "noise"))?,
+                drift: self
+                    .drift
+                    .map_or_else(|| DVector::zeros(n), DVector::from_vec),
                 b,
             },
             later: self.later,
+            laws: self.laws,
             sensor: Sensor {
                 noise: square(&self.sensor[1], m, path("sensor", "noise"))?,
                 present: self.present,

@@ -7,6 +7,7 @@
 
 use nalgebra::DMatrix;
 
+use super::law::{Formula, Point};
 use super::{ActionId, Event, ModeId, Model, Region, Steps, Then, When, applies};
 
 /// One thing that a step can do. Whoever knows how likely its region holds knows the rest ([`Tally`]).
@@ -18,6 +19,10 @@ pub struct Effect {
     pub when: When,
     /// Paid when it happens.
     pub reward: f64,
+    /// What is paid besides, where it depends on the state.
+    pub formula: Option<Formula>,
+    /// Probability that it happens where its region holds.
+    pub chance: f64,
     /// What it changes; `None` for a reward, which is paid beside everything else.
     pub change: Option<Change>,
 }
@@ -120,6 +125,8 @@ impl Model {
             region: term.region.clone(),
             when: term.when,
             reward: term.value,
+            formula: term.formula.clone(),
+            chance: 1.0,
             change: None,
         });
         let mut events: Vec<&Event> = self
@@ -132,6 +139,8 @@ impl Model {
             region: event.region.clone(),
             when: event.when,
             reward: event.reward,
+            formula: None,
+            chance: event.probability,
             change: Some(Change {
                 mode: event.becomes.unwrap_or(mode),
                 then: event.then,
@@ -278,7 +287,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Takes in the next effect, whose region holds with this probability; for an event, the outcome that it leads to.
+    /// Takes in the next effect, which happens with this probability unless an event has; for an event, the outcome that it leads to.
     pub fn take(&mut self, effect: &Effect, holds: f64) -> Option<Outcome> {
         let Some(change) = effect.change else {
             self.reward += effect.reward * holds;
@@ -297,15 +306,39 @@ impl Tally {
         })
     }
 
-    /// Takes in effects for someone who sees the state, of length `n`; what has happened, if an event has.
+    /// Takes in effects for someone who sees the state, of length `n`, of a model whose events are certain and whose rewards are
+    /// numbers; what has happened, if an event has.
     pub fn see<'a>(
         &mut self,
         effects: impl IntoIterator<Item = &'a Effect>,
         state: &[f64],
     ) -> Option<Outcome> {
+        let point = Point {
+            state,
+            control: &[],
+            step: 0,
+        };
+        self.live(effects, &point, &mut || 0.0)
+    }
+
+    /// Takes in effects for someone who sees the state and to whom chance happens: `chance` draws a number in `[0, 1)`, once for every
+    /// event that may or may not happen here. What has happened, if an event has.
+    pub fn live<'a>(
+        &mut self,
+        effects: impl IntoIterator<Item = &'a Effect>,
+        point: &Point<'_>,
+        chance: &mut dyn FnMut() -> f64,
+    ) -> Option<Outcome> {
         let mut happened = None;
         for effect in effects {
-            let outcome = self.take(effect, f64::from(effect.region.contains(state)));
+            let mut holds = effect.region.contains(point.state);
+            if holds && self.left > 0.0 && effect.chance < 1.0 {
+                holds = chance() < effect.chance;
+            }
+            if let Some(formula) = effect.formula.as_ref().filter(|_| holds) {
+                self.reward += formula.value(point);
+            }
+            let outcome = self.take(effect, f64::from(holds));
             happened = happened.or(outcome.filter(|outcome| outcome.probability == 1.0));
         }
         happened

@@ -17,9 +17,12 @@
 
 mod barriers;
 mod builder;
+mod dynamics;
 mod effects;
 pub(crate) mod error;
+mod expression;
 pub(crate) mod fingerprint;
+mod law;
 pub(crate) mod map;
 mod region;
 pub(crate) mod validate;
@@ -30,11 +33,15 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use barriers::Barriers;
 pub use builder::{Clause, ModelBuilder};
+pub use dynamics::{Doing, Dynamics};
 pub(crate) use effects::EffectTable;
 pub use effects::{Change, Effect, Outcome, Switch, Tally, apart};
 pub(crate) use error::nearest;
 pub use error::{Fault, ModelError, Path, Place, Step, suggest};
+pub use expression::{Expression, ExpressionError};
 pub use fingerprint::{Fingerprint, NotAFingerprint};
+pub(crate) use law::MOST_TOLD;
+pub use law::{Case, Coded, Formula, Laws, MotionLaw, Point, SensorLaw, VariableKind};
 pub use map::Map;
 pub use region::{Interval, Region};
 
@@ -69,6 +76,8 @@ pub struct Model {
     pub sensor: Sensor,
     /// Motion and sensor from later steps of an episode on, in the order of their steps.
     pub later: Vec<Phase>,
+    /// What goes beyond linear motion and sensing.
+    pub laws: Laws,
     /// The actions, in file order. Ties between actions go to the first.
     pub actions: Vec<Action>,
     /// Rewards `r(s, a)`, added up over all terms that apply.
@@ -92,6 +101,9 @@ pub struct StateVariable {
     pub name: String,
     /// Outer limits of the world along this variable; infinite where there are none.
     pub bounds: Interval,
+    /// What its values are.
+    #[serde(default)]
+    pub kind: VariableKind,
 }
 
 /// One Gaussian component of the initial belief (Eq. 5.15).
@@ -119,13 +131,15 @@ pub enum StartShape {
     Uniform,
 }
 
-/// Linear motion `s' = A s + B u + v` (Eq. 2.26).
+/// Linear motion `s' = A s + B u + d + v` (Eq. 2.26, with a drift `d`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
     /// State transition, `n x n`.
     pub a: DMatrix<f64>,
     /// Control matrix, `n x p`.
     pub b: DMatrix<f64>,
+    /// What is added at every step, length `n`.
+    pub drift: DVector<f64>,
     /// Process noise covariance `Q`, `n x n`, for actions that do not state their own.
     pub noise: DMatrix<f64>,
 }
@@ -234,6 +248,8 @@ pub struct Reward {
     pub steps: Steps,
     /// Amount, in units of reward.
     pub value: f64,
+    /// What is paid besides, where it depends on the state: that before or after the step, as [`Reward::when`] says.
+    pub formula: Option<Formula>,
 }
 
 /// A change of the hidden mode, with its reward.
@@ -249,6 +265,8 @@ pub struct Event {
     pub when: When,
     /// Steps of the episode in which it can happen.
     pub steps: Steps,
+    /// Probability that it happens there, in `[0, 1]`. One that does not leaves the turn to the next.
+    pub probability: f64,
     /// Mode afterwards; `None` leaves it.
     pub becomes: Option<ModeId>,
     /// Paid when it happens.
@@ -291,6 +309,12 @@ pub struct BeliefSettings {
     pub walls: WallBelief,
     /// How several start hypotheses are kept.
     pub hypotheses: HypothesisBelief,
+    /// What keeps the belief.
+    pub tracker: TrackerKind,
+    /// Most Gaussians of a sum, at least 1; `None` for what the number of variables asks for.
+    pub components: Option<usize>,
+    /// Cells along a variable, at least 2; `None` for what the number of variables asks for.
+    pub cells: Option<usize>,
 }
 
 impl Default for Episode {
@@ -310,8 +334,26 @@ impl Default for BeliefSettings {
             level_limit: 400,
             walls: WallBelief::Ignore,
             hypotheses: HypothesisBelief::Collapse,
+            tracker: TrackerKind::Auto,
+            components: None,
+            cells: None,
         }
     }
+}
+
+/// What keeps a belief.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum TrackerKind {
+    /// What the model asks for: `linear` where one Gaussian is exact, `sum` elsewhere, `cells` for a discrete sensor.
+    #[default]
+    Auto,
+    /// The Kalman filter on uncertainty levels, at one believed mode.
+    Linear,
+    /// A sum of weighted Gaussians, each in a mode.
+    Sum,
+    /// Probabilities of cells, for one and two state variables with bounds.
+    Cells,
 }
 
 /// What the filter makes of walls.
@@ -385,9 +427,22 @@ impl Model {
         own.unwrap_or(&self.sensor_at(step).noise)
     }
 
-    /// Displacement `B u` of an action at a step.
+    /// Displacement `B u + d` of an action at a step.
     pub fn displacement(&self, action: ActionId, step: usize) -> DVector<f64> {
-        &self.motion_at(step).b * &self.actions[action].control
+        let motion = self.motion_at(step);
+        &motion.b * &self.actions[action].control + &motion.drift
+    }
+
+    /// Whether motion and sensing are linear, with Gaussian noise that no place and no mode changes, events are certain where they
+    /// happen, and rewards are numbers: whether uncertainty levels follow it.
+    pub fn is_linear(&self) -> bool {
+        self.laws == Laws::default()
+            && self
+                .state
+                .iter()
+                .all(|variable| variable.kind == VariableKind::Real)
+            && self.events.iter().all(|event| event.probability == 1.0)
+            && self.rewards.iter().all(|reward| reward.formula.is_none())
     }
 
     /// Steps at which phases begin.

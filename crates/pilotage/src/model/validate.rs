@@ -1,5 +1,6 @@
 //! What every model fulfils, whether it was read from a file or built by a program.
 
+mod laws;
 mod numbers;
 
 use nalgebra::DVector;
@@ -18,6 +19,12 @@ const MOST_NAMES: usize = 1000;
 
 /// Most uncertainty levels.
 pub(crate) const MOST_LEVELS: usize = 100_000;
+
+/// Most Gaussians of a sum.
+const MOST_COMPONENTS: usize = 1000;
+
+/// Most cells along a variable.
+const MOST_CELLS: usize = 2000;
 
 /// Weights of hypotheses may miss 1 by this much, which decimals such as 0.333333333 need.
 const WEIGHT_TOLERANCE: f64 = 1e-6;
@@ -44,6 +51,7 @@ impl Model {
         self.check_discount()?;
         self.check_motion_and_sensor()?;
         self.check_actions()?;
+        self.check_laws()?;
         self.check_episode()?;
         self.check_hypotheses(&self.start, &Path::new("start"))?;
         for (i, reward) in self.rewards.iter().enumerate() {
@@ -57,7 +65,14 @@ impl Model {
             self.check_condition(&event.actions, event.mode, &event.region, &path)?;
             self.check_mode(event.becomes, path.clone().key("becomes"))?;
             self.check_begins(event.steps.from, path.clone().key("steps").key("from"))?;
-            finite(event.reward, path.key("reward"))?;
+            finite(event.reward, path.clone().key("reward"))?;
+            if !(0.0..=1.0).contains(&event.probability) {
+                return Err(Fault::new(
+                    path.key("probability"),
+                    format!("the probability of an event is {}", event.probability),
+                    "give a number from 0 to 1",
+                ));
+            }
         }
         self.check_cost()?;
         self.check_belief()
@@ -166,20 +181,25 @@ impl Model {
         let size = (n, self.motion.b.ncols().max(1));
         shape(&motion.b, size, &variables, path.clone().key("B"))?;
         finite_matrix(&motion.b, path.clone().key("B"))?;
+        vector(&motion.drift, n, &variables, path.clone().key("drift"))?;
         covariance(&motion.noise, n, &variables, path.key("noise"))
     }
 
     fn check_sensor(&self, sensor: &Sensor, path: Path) -> Result<(), Fault> {
         let (n, m) = (self.state_dim(), self.observation_dim());
         let variables = format!("there are {n} state variables");
-        shape(&sensor.h, (m.max(1), n), &variables, path.clone().key("H"))?;
+        let rows = if self.laws.symbols.is_empty() {
+            m.max(1)
+        } else {
+            0
+        };
+        shape(&sensor.h, (rows, n), &variables, path.clone().key("H"))?;
         finite_matrix(&sensor.h, path.clone().key("H"))?;
-        covariance(
-            &sensor.noise,
-            m,
-            &self.readings(),
-            path.clone().key("noise"),
-        )?;
+        let noise = path.clone().key("noise");
+        match rows {
+            0 => shape(&sensor.noise, (0, 0), "signals have no noise", noise)?,
+            _ => covariance(&sensor.noise, m, &self.readings(), noise)?,
+        }
         if !(0.0..=1.0).contains(&sensor.present) {
             return Err(Fault::new(
                 path.key("present"),
@@ -431,6 +451,18 @@ impl Model {
             "levels",
             path("level_limit"),
         )?;
+        for (key, count, least, most) in [
+            ("components", self.belief.components, 1, MOST_COMPONENTS),
+            ("cells", self.belief.cells, 2, MOST_CELLS),
+        ] {
+            if let Some(count) = count.filter(|count| !(least..=most).contains(count)) {
+                return Err(Fault::new(
+                    path(key),
+                    format!("{count} {key}"),
+                    format!("give {least} to {most}"),
+                ));
+            }
+        }
         Ok(())
     }
 

@@ -1,15 +1,20 @@
 //! The model file as it is written, format 1. The documentation of these tables is the documentation of the format:
 //! it goes into the JSON schema word for word.
 
+use std::collections::BTreeMap;
+
 use schemars::{JsonSchema, Schema};
 use serde::Deserialize;
 
-use super::file_value::{Ends, Named, OneOrMany, Sides, Where};
+use super::file_value::{Ends, Named, OneOrMany, Scalar, Sides, Where};
 use super::{CartPole, Robot, Walls};
-use crate::model::{HypothesisBelief, Then, WallBelief, When};
+use crate::model::{HypothesisBelief, Then, TrackerKind, WallBelief, When};
 
 /// Rows of numbers: `[[1.0, 0.0], [0.0, 1.0]]`.
 pub(super) type Rows = Vec<Vec<f64>>;
+
+/// Rows of numbers or expressions: `[["0.01 + 0.1*abs(x)", 0.0], [0.0, 1.0]]`.
+pub(super) type ScalarRows = Vec<Vec<Scalar>>;
 
 /// JSON schema of model files, for editors and for people.
 pub fn schema() -> Schema {
@@ -19,7 +24,8 @@ pub fn schema() -> Schema {
 /// A planning problem: what the agent assumes about its world, what it is paid for, and what is true.
 ///
 /// With n state variables, p controls and m sensor readings, the agent assumes
-/// s' = A s + B u + v, v ~ N(0, motion.noise) and o = H s + n, n ~ N(0, sensor.noise).
+/// s' = A s + B u + drift + v, v ~ N(0, motion.noise) and o = H s + n, n ~ N(0, sensor.noise), or `motion.step` and `sensor.read`
+/// in place of the matrices.
 /// Every noise is a covariance, never a standard deviation. Numbers are finite, except the ends of a region.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
@@ -46,6 +52,9 @@ pub(super) struct ModelFile {
     /// How state and sensor change in the course of an episode, in the order of the steps. Default: they do not.
     #[serde(default)]
     pub later: Vec<LaterTable>,
+    /// Motion and sensor in a mode or on an action, where they are others. All that apply count, later ones before earlier ones.
+    #[serde(default)]
+    pub case: Vec<CaseTable>,
     /// The actions by name, at least one. Between actions that are equally good the first in the file is taken.
     #[schemars(with = "std::collections::BTreeMap<String, ActionTable>")]
     pub actions: Named<ActionTable>,
@@ -79,9 +88,18 @@ pub(super) struct StateTable {
     /// Lower and upper end of the world along each variable, n pairs; a hint given to the agent, and the walls of
     /// the world if `world.walls` says so. Default: the extent of the map, or no bounds.
     pub bounds: Option<Vec<Ends>>,
-    /// Names of the hidden modes, which no sensor shows. Default: one mode without a name.
+    /// Names of the hidden modes. Default: one mode without a name.
     #[serde(default)]
     pub modes: Vec<String>,
+    /// Whether the agent sees the mode after every step. Default: no sensor shows it.
+    #[serde(default)]
+    pub modes_seen: bool,
+    /// The variables whose values are whole numbers: what a step leads to is rounded.
+    #[serde(default)]
+    pub integer: Vec<String>,
+    /// The variables that are angles in radians: they are kept in [-pi, pi).
+    #[serde(default)]
+    pub angle: Vec<String>,
 }
 
 /// One Gaussian of a start.
@@ -105,14 +123,19 @@ pub(super) struct StartTable {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table")]
 pub(super) struct MotionTable {
-    /// How the state moves on its own, n x n. Needed unless `linearise` is given.
+    /// How the state moves on its own, n x n. Needed unless `step` says it of all variables, or `linearise` is given.
     #[serde(rename = "A")]
     pub a: Option<Rows>,
-    /// How controls move the state, n x p. Default: the identity.
+    /// How controls move the state, n x p. Default: the identity; with `step`, the n x p of zeros that the actions' `u` fits.
     #[serde(rename = "B")]
     pub b: Option<Rows>,
-    /// Covariance of v, n x n. Needed unless `linearise` is given.
-    pub noise: Option<Rows>,
+    /// What is added at every step, n numbers. Default: zeros.
+    pub drift: Option<Vec<f64>>,
+    /// The next value of state variables by name, noise apart, instead of A s + B u + drift: `step = { x = "x + u1" }`.
+    #[serde(default)]
+    pub step: BTreeMap<String, Scalar>,
+    /// Covariance of v, n x n, of numbers or expressions. Needed unless `linearise` is given; with `step`, zeros by default.
+    pub noise: Option<ScalarRows>,
     /// Takes A and B from a plant: its linearisation about the upright pole, held for `world.cart-pole.step` seconds, and
     /// a noise of B q B' + 1e-9 I, where q is its `force_noise`.
     pub linearise: Option<Plant>,
@@ -134,10 +157,74 @@ pub(super) struct SensorTable {
     /// What is sensed of the state, m x n. Default: all of it, the identity.
     #[serde(rename = "H")]
     pub h: Option<Rows>,
-    /// Covariance of n, m x m.
-    pub noise: Rows,
-    /// Probability that there is a reading after a step, in [0, 1]. The agent knows when one is missing. Default: 1.
-    pub present: Option<f64>,
+    /// What is read, noise apart, instead of H s, by name of the reading: `read = { range = "hypot(x, y)" }`.
+    #[schemars(with = "Option<BTreeMap<String, Scalar>>")]
+    pub read: Option<Named<Scalar>>,
+    /// A discrete sensor instead of readings: probability of each of its signals by name, of which one may be `"rest"`, what is left
+    /// to 1: `symbols = { bright = "exp(-x^2)", dark = "rest" }`.
+    #[schemars(with = "Option<BTreeMap<String, Scalar>>")]
+    pub symbols: Option<Named<Scalar>>,
+    /// Covariance of n, m x m, of numbers or expressions. Needed unless `symbols` is given.
+    pub noise: Option<ScalarRows>,
+    /// Probability that there is a reading after a step, in [0, 1], a number or an expression. The agent knows when one is missing.
+    /// Default: 1.
+    pub present: Option<Scalar>,
+    /// Ends at which readings saturate, m pairs: what lies beyond is read as the end. Default: none.
+    pub saturates: Option<Vec<Ends>>,
+}
+
+/// Motion and sensor in some modes, on some actions. What is not given stays as it is.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct CaseTable {
+    /// The mode or list of modes it applies to, for motion that in which the action is taken, for the sensor that after it. Default: all.
+    pub mode: Option<OneOrMany<String>>,
+    /// The action or list of actions it applies to. Default: all.
+    pub action: Option<OneOrMany<String>>,
+    /// What is different about the motion.
+    #[serde(default)]
+    pub motion: CaseMotionTable,
+    /// What is different about the sensor.
+    #[serde(default)]
+    pub sensor: CaseSensorTable,
+}
+
+/// What is different about the motion.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct CaseMotionTable {
+    /// How the state moves on its own, n x n.
+    #[serde(rename = "A")]
+    pub a: Option<Rows>,
+    /// How controls move the state, n x p.
+    #[serde(rename = "B")]
+    pub b: Option<Rows>,
+    /// What is added at every step, n numbers.
+    pub drift: Option<Vec<f64>>,
+    /// The next value of state variables by name, noise apart.
+    #[serde(default)]
+    pub step: BTreeMap<String, Scalar>,
+    /// Covariance of v, n x n, of numbers or expressions.
+    pub noise: Option<ScalarRows>,
+}
+
+/// What is different about the sensor.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct CaseSensorTable {
+    /// What is sensed of the state, m x n, with as many readings as otherwise.
+    #[serde(rename = "H")]
+    pub h: Option<Rows>,
+    /// What is read, noise apart, by name of the reading, as many as otherwise.
+    #[schemars(with = "Option<BTreeMap<String, Scalar>>")]
+    pub read: Option<Named<Scalar>>,
+    /// Probability of each signal by name, the same names as otherwise.
+    #[schemars(with = "Option<BTreeMap<String, Scalar>>")]
+    pub symbols: Option<Named<Scalar>>,
+    /// Covariance of n, m x m, of numbers or expressions.
+    pub noise: Option<ScalarRows>,
+    /// Probability that there is a reading, a number or an expression.
+    pub present: Option<Scalar>,
 }
 
 /// Motion and sensor from a step of the episode on. What is not given stays as it was before.
@@ -213,8 +300,8 @@ pub(super) struct RewardTable {
     /// The steps of an episode in which it is paid. Default: all.
     #[serde(default)]
     pub steps: StepsTable,
-    /// Amount.
-    pub value: f64,
+    /// Amount: a number, or an expression of the state (that before or after the move, as `when` says), the control and the step.
+    pub value: Scalar,
 }
 
 /// A change of the hidden mode, when the action is taken in the mode and the state is in the region.
@@ -234,6 +321,8 @@ pub(super) struct EventTable {
     /// The steps of an episode in which it can happen. Default: all.
     #[serde(default)]
     pub steps: StepsTable,
+    /// Probability that it happens there, in [0, 1]. Default: 1.
+    pub probability: Option<f64>,
     /// The mode afterwards. Default: as before.
     pub becomes: Option<String>,
     /// Paid when it happens. Default: 0.
@@ -291,9 +380,16 @@ pub(super) struct BeliefTable {
     /// Whether the filter uses what walls tell it.
     #[serde(default)]
     pub walls: WallBelief,
-    /// How several start hypotheses are kept.
+    /// How several start hypotheses are kept, by the linear tracker.
     #[serde(default)]
     pub hypotheses: HypothesisBelief,
+    /// What keeps the belief. Default: what the model asks for.
+    #[serde(default)]
+    pub tracker: TrackerKind,
+    /// Most Gaussians of a sum. Default: 40 for one state variable, 16 for more.
+    pub components: Option<u64>,
+    /// Cells along a variable. Default: 200 for one state variable, 40 for two.
+    pub cells: Option<u64>,
 }
 
 /// A map drawn as text, in one of two forms.

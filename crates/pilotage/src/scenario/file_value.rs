@@ -40,6 +40,48 @@ impl<'de> Deserialize<'de> for Ends {
     }
 }
 
+/// A number, or an expression of it: `"0.01 + 0.1*abs(x)"`.
+///
+/// An expression knows the state variables by name, the controls of the action `u1`, `u2`, ... and the step of the episode `t`, counted
+/// from 0; `pi`, `e` and `inf`; `+ - * / % ^`, comparisons, `and or not`; and the functions abs sqrt exp ln log10 sin cos tan asin acos
+/// atan atan2 hypot min max pow sign floor round clamp(x, low, high) if(condition, then, else). `-x^2` is `-(x^2)`.
+#[derive(Debug, Clone, JsonSchema)]
+#[schemars(untagged)]
+pub(super) enum Scalar {
+    /// A number.
+    Number(f64),
+    /// An expression, in quotes.
+    Expression(String),
+}
+
+impl<'de> Deserialize<'de> for Scalar {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ScalarVisitor;
+
+        impl Visitor<'_> for ScalarVisitor {
+            type Value = Scalar;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number, or an expression in quotes")
+            }
+
+            fn visit_str<E: Error>(self, text: &str) -> Result<Scalar, E> {
+                Ok(Scalar::Expression(text.to_owned()))
+            }
+
+            fn visit_f64<E: Error>(self, value: f64) -> Result<Scalar, E> {
+                Ok(Scalar::Number(value))
+            }
+
+            fn visit_i64<E: Error>(self, value: i64) -> Result<Scalar, E> {
+                Ok(Scalar::Number(value as f64))
+            }
+        }
+
+        deserializer.deserialize_any(ScalarVisitor)
+    }
+}
+
 /// One value, or a list of such values.
 #[derive(Debug, JsonSchema)]
 #[schemars(untagged)]

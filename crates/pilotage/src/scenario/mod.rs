@@ -12,6 +12,7 @@ mod cart_pole;
 mod file;
 mod file_value;
 mod fingerprint;
+mod laws;
 mod locate;
 mod read;
 mod resolve;

@@ -6,7 +6,8 @@ use super::file::{
     ActionTable, ControlTable, EventTable, Kind, ModelFile, Plant, RewardTable, Rows, StartTable,
     StateTable, StepsTable, WorldMotionTable,
 };
-use super::file_value::{Ends, OneOrMany, Sides, Where};
+use super::file_value::{Ends, OneOrMany, Scalar, Sides, Where};
+use super::laws::{self, Writing, readings};
 use super::*;
 use crate::model::error::{Fault, Path};
 use crate::model::map::{self, Map};
@@ -52,8 +53,9 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
         "controls",
         Path::new("motion").key("B"),
     )?;
+    let writing = Writing::new(&names.state, controls);
     let (reward_lines, rewards) = numbered(&file.reward, "reward", |table, path| {
-        names.rewards(table, path)
+        names.rewards(table, path, &writing)
     })?;
     let (event_lines, events) = numbered(&file.event, "event", |table, path| {
         names.events(table, path)
@@ -67,16 +69,14 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
         },
         motion: names.true_motion(&file.world.motion)?,
     };
-    let sensor = Sensor {
-        h: match &file.sensor.h {
-            Some(rows) => matrix(rows, Path::new("sensor").key("H"))?,
-            None => DMatrix::identity(file.state.names.len(), file.state.names.len()),
-        },
-        noise: matrix(&file.sensor.noise, Path::new("sensor").key("noise"))?,
-        present: file.sensor.present.unwrap_or(1.0),
-    };
+    let sensor = sensor(&file)?;
+    let mut state = state_variables(&file.state, map.as_ref())?;
+    for (variable, kind) in state.iter_mut().zip(laws::kinds(&file.state, &names)?) {
+        variable.kind = kind;
+    }
     let model = Model {
-        state: state_variables(&file.state, map.as_ref())?,
+        laws: laws::laws(&file, &names, &writing)?,
+        state,
         start: names.start(&file.start, Path::new("start"))?,
         later: later(&file, &motion, &sensor)?,
         sensor,
@@ -108,8 +108,8 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
 }
 
 /// The names that a file declares and its other tables refer to.
-struct Names {
-    state: Vec<String>,
+pub(super) struct Names {
+    pub(super) state: Vec<String>,
     modes: Vec<String>,
     actions: Vec<String>,
     /// Marked cells of the map, if there is one.
@@ -125,7 +125,15 @@ impl Names {
             .transpose()
     }
 
-    fn action_list(
+    pub(super) fn mode_named(&self, name: &str, path: Path) -> Result<ModeId, Fault> {
+        index_of(&self.modes, "mode", name, path)
+    }
+
+    pub(super) fn variable(&self, name: &str, path: Path) -> Result<usize, Fault> {
+        index_of(&self.state, "state variable", name, path)
+    }
+
+    pub(super) fn action_list(
         &self,
         list: &Option<OneOrMany<String>>,
         path: &Path,
@@ -196,7 +204,14 @@ impl Names {
         ))
     }
 
-    fn rewards(&self, table: &RewardTable, path: &Path) -> Result<Vec<Reward>, Fault> {
+    fn rewards(
+        &self,
+        table: &RewardTable,
+        path: &Path,
+        writing: &Writing,
+    ) -> Result<Vec<Reward>, Fault> {
+        let amount = writing.formula(&table.value, path.clone().key("value"))?;
+        let value = amount.constant();
         let actions = self.action_list(&table.action, path)?;
         let mode = self.mode(&table.mode, path.clone().key("mode"))?;
         let regions = self.regions(&table.place, path)?;
@@ -209,7 +224,8 @@ impl Names {
                 region,
                 when: table.when,
                 steps,
-                value: table.value,
+                value: value.unwrap_or(0.0),
+                formula: value.is_none().then(|| amount.clone()),
             })
             .collect())
     }
@@ -228,6 +244,7 @@ impl Names {
                 region,
                 when: table.when,
                 steps,
+                probability: table.probability.unwrap_or(1.0),
                 becomes,
                 reward: table.reward,
                 then: table.then,
@@ -384,7 +401,7 @@ fn numbered<T, U>(
     Ok((lines, items))
 }
 
-fn matrix(rows: &Rows, path: Path) -> Result<DMatrix<f64>, Fault> {
+pub(super) fn matrix(rows: &Rows, path: Path) -> Result<DMatrix<f64>, Fault> {
     let columns = rows.first().map_or(0, Vec::len);
     if let Some(row) = rows.iter().position(|row| row.len() != columns) {
         return Err(Fault::new(
@@ -404,7 +421,10 @@ fn matrix(rows: &Rows, path: Path) -> Result<DMatrix<f64>, Fault> {
     ))
 }
 
-fn optional_matrix(rows: &Option<Rows>, path: Path) -> Result<Option<DMatrix<f64>>, Fault> {
+pub(super) fn optional_matrix(
+    rows: &Option<Rows>,
+    path: Path,
+) -> Result<Option<DMatrix<f64>>, Fault> {
     rows.as_ref().map(|rows| matrix(rows, path)).transpose()
 }
 
@@ -435,7 +455,11 @@ fn state_variables(table: &StateTable, map: Option<&Map>) -> Result<Vec<StateVar
         .iter()
         .cloned()
         .zip(bounds)
-        .map(|(name, bounds)| StateVariable { name, bounds })
+        .map(|(name, bounds)| StateVariable {
+            name,
+            bounds,
+            kind: VariableKind::Real,
+        })
         .collect())
 }
 
@@ -451,8 +475,13 @@ fn motion(file: &ModelFile) -> Result<Motion, Fault> {
         None => None,
     };
     if let Some(plant) = plant {
-        for (key, rows) in [("A", &table.a), ("B", &table.b)] {
-            if rows.is_some() {
+        for (key, is_given) in [
+            ("A", table.a.is_some()),
+            ("B", table.b.is_some()),
+            ("drift", table.drift.is_some()),
+            ("step", !table.step.is_empty()),
+        ] {
+            if is_given {
                 return Err(Fault::of_key(
                     path(key),
                     format!("`{key}` is given, and also comes from `linearise`"),
@@ -471,25 +500,108 @@ fn motion(file: &ModelFile) -> Result<Motion, Fault> {
                 "give a shorter `step`, or masses, lengths and a gravity nearer to 1",
             ));
         }
-        let noise = optional_matrix(&table.noise, path("noise"))?.unwrap_or(noise);
-        return Ok(Motion { a, b, noise });
-    }
-    let needed = |key: &str, rows: &Option<Rows>| {
-        let missing = || {
-            Fault::new(
-                Path::new("motion"),
-                format!("the key `{key}` is missing"),
-                format!("add `{key}` to [motion]"),
-            )
+        let noise = match &table.noise {
+            Some(rows) => laws::numbers(rows, |_, _| 0.0, path("noise"))?,
+            None => noise,
         };
-        optional_matrix(rows, path(key))?.ok_or_else(missing)
-    };
+        let drift = DVector::zeros(a.nrows());
+        return Ok(Motion { a, b, drift, noise });
+    }
     let variables = file.state.names.len();
+    let missing = |key: &str| {
+        Fault::new(
+            Path::new("motion"),
+            format!("the key `{key}` is missing"),
+            format!("add `{key}` to [motion]"),
+        )
+    };
+    // Where formulas say all of the motion, the matrices have nothing to say.
+    let said = file
+        .state
+        .names
+        .iter()
+        .all(|name| table.step.contains_key(name));
+    let controls = file
+        .actions
+        .0
+        .iter()
+        .filter_map(|(_, table)| table.u.as_ref());
+    let controls = controls.map(Vec::len).max().unwrap_or(1).max(1);
+    let a = optional_matrix(&table.a, path("A"))?;
+    let b = optional_matrix(&table.b, path("B"))?;
     Ok(Motion {
-        a: needed("A", &table.a)?,
-        b: optional_matrix(&table.b, path("B"))?
-            .unwrap_or_else(|| DMatrix::identity(variables, variables)),
-        noise: needed("noise", &table.noise)?,
+        a: match a {
+            None if said => DMatrix::identity(variables, variables),
+            a => a.ok_or_else(|| missing("A"))?,
+        },
+        b: b.unwrap_or_else(|| match table.step.is_empty() {
+            true => DMatrix::identity(variables, variables),
+            false => DMatrix::zeros(variables, controls),
+        }),
+        drift: table
+            .drift
+            .as_deref()
+            .map_or_else(|| DVector::zeros(variables), DVector::from_column_slice),
+        noise: match &table.noise {
+            Some(rows) => laws::numbers(rows, |_, _| 0.0, path("noise"))?,
+            None if said => DMatrix::zeros(variables, variables),
+            None => return Err(missing("noise")),
+        },
+    })
+}
+
+fn sensor(file: &ModelFile) -> Result<Sensor, Fault> {
+    let (table, path) = (&file.sensor, |key: &str| Path::new("sensor").key(key));
+    let variables = file.state.names.len();
+    let readings = readings(table, variables);
+    let others = [
+        ("H", table.h.is_some()),
+        ("read", table.read.is_some()),
+        ("symbols", table.symbols.is_some()),
+    ];
+    let mut given = others.iter().filter(|(_, given)| *given);
+    if let (Some((one, _)), Some((other, _))) = (given.next(), given.next()) {
+        return Err(Fault::of_key(
+            path(other),
+            format!("`{other}` is given, and `{one}` as well"),
+            format!("delete `{one}` or `{other}`: each says all that is sensed"),
+        ));
+    }
+    if table.symbols.is_some() {
+        for (key, given) in [
+            ("noise", table.noise.is_some()),
+            ("saturates", table.saturates.is_some()),
+        ] {
+            if given {
+                return Err(Fault::of_key(
+                    path(key),
+                    "signals have probabilities and nothing else",
+                    format!("delete `{key}` or `symbols`"),
+                ));
+            }
+        }
+    }
+    Ok(Sensor {
+        h: match (&table.h, &table.read, &table.symbols) {
+            (Some(rows), _, _) => matrix(rows, path("H"))?,
+            (None, None, None) => DMatrix::identity(variables, variables),
+            _ => DMatrix::zeros(readings, variables),
+        },
+        noise: match &table.noise {
+            Some(rows) => laws::numbers(rows, |_, _| 0.0, path("noise"))?,
+            None if table.symbols.is_some() => DMatrix::zeros(0, 0),
+            None => {
+                return Err(Fault::new(
+                    Path::new("sensor"),
+                    "the key `noise` is missing",
+                    "add `noise` to [sensor]",
+                ));
+            }
+        },
+        present: match &table.present {
+            Some(Scalar::Number(present)) => *present,
+            _ => 1.0,
+        },
     })
 }
 
@@ -592,6 +704,9 @@ fn belief(file: &ModelFile) -> BeliefSettings {
         level_limit: table.level_limit.map_or(default.level_limit, saturating),
         walls: table.walls,
         hypotheses: table.hypotheses,
+        tracker: table.tracker,
+        components: table.components.map(saturating),
+        cells: table.cells.map(saturating),
     }
 }
 

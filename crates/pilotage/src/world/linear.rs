@@ -103,7 +103,8 @@ fn displacement(scenario: &Scenario, mode: ModeId, action: ActionId, step: usize
     let mut controls = scenario.truth.motion.controls.iter();
     let truly = controls.find(|control| control.applies(mode, action));
     let control = truly.map_or(&model.actions[action].control, |truly| &truly.control);
-    (&model.motion_at(step).b * control).as_slice().to_vec()
+    let motion = model.motion_at(step);
+    (&motion.b * control + &motion.drift).as_slice().to_vec()
 }
 
 impl Body for Linear {

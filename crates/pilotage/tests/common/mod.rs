@@ -39,6 +39,7 @@ impl System {
         let state = |i| StateVariable {
             name: format!("x{i}"),
             bounds: Interval::new(-10.0, 10.0),
+            kind: pilotage::model::VariableKind::Real,
         };
         Model {
             name: "system".to_owned(),
@@ -56,6 +57,7 @@ impl System {
             motion: Motion {
                 a: self.a.clone(),
                 b: DMatrix::identity(n, n),
+                drift: DVector::zeros(n),
                 noise: self.q.clone(),
             },
             sensor: Sensor {
@@ -64,6 +66,7 @@ impl System {
                 present: 1.0,
             },
             later: Vec::new(),
+            laws: pilotage::model::Laws::default(),
             actions: vec![action("STAY", DVector::zeros(n))],
             rewards: Vec::new(),
             events: Vec::new(),

@@ -149,6 +149,8 @@ kinds! {
     Then { Continue => "continue", End => "end", Restart => "restart" }
     When { Before => "before", After => "after" }
     WallBelief { Ignore => "ignore", Clip => "clip" }
+    TrackerKind { Auto => "auto", Linear => "linear", Sum => "sum", Cells => "cells" }
+    VariableKind { Real => "real", Integer => "integer", Angle => "angle" }
     HypothesisBelief { Collapse => "collapse", Gaussian => "gaussian", Track => "track" }
 }
 
@@ -166,6 +168,7 @@ impl Canonical for Model {
             motion,
             sensor,
             later,
+            laws,
             actions,
             rewards,
             events,
@@ -189,6 +192,7 @@ impl Canonical for Model {
             .field("motion", motion)
             .field("sensor", sensor)
             .list("later", later)
+            .unless(&Laws::default(), "laws", laws)
             .field("actions", &actions)
             .list("rewards", rewards)
             .list("events", events)
@@ -202,10 +206,11 @@ impl Canonical for Model {
 
 impl Canonical for StateVariable {
     fn write(&self, digest: &mut Digest) {
-        let Self { name, bounds } = self;
+        let Self { name, bounds, kind } = self;
         Fields(digest)
             .field("name", name)
             .unless(&Interval::ALL, "bounds", bounds)
+            .unless(&VariableKind::default(), "kind", kind)
             .end();
     }
 }
@@ -231,10 +236,11 @@ impl Canonical for StartHypothesis {
 
 impl Canonical for Motion {
     fn write(&self, digest: &mut Digest) {
-        let Self { a, b, noise } = self;
+        let Self { a, b, drift, noise } = self;
         Fields(digest)
             .field("A", a)
             .field("B", b)
+            .unless(&DVector::zeros(drift.len()), "drift", drift)
             .field("noise", noise)
             .end();
     }
@@ -247,6 +253,88 @@ impl Canonical for Sensor {
             .field("H", h)
             .field("noise", noise)
             .unless(&1.0, "present", present)
+            .end();
+    }
+}
+
+impl Canonical for bool {
+    fn write(&self, digest: &mut Digest) {
+        digest.write(&[u8::from(*self)]);
+    }
+}
+
+impl Canonical for Formula {
+    fn write(&self, digest: &mut Digest) {
+        match self {
+            Self::Number(value) => value.write(digest),
+            Self::Written(expression) => expression.source().write(digest),
+            Self::Coded(_) => self.text().write(digest),
+        }
+    }
+}
+
+impl Canonical for DMatrix<Formula> {
+    fn write(&self, digest: &mut Digest) {
+        self.nrows().write(digest);
+        self.ncols().write(digest);
+        self.transpose()
+            .iter()
+            .for_each(|entry| entry.write(digest));
+    }
+}
+
+impl Canonical for Laws {
+    fn write(&self, digest: &mut Digest) {
+        let Self {
+            cases,
+            symbols,
+            saturates,
+            modes_seen,
+        } = self;
+        Fields(digest)
+            .list("cases", cases)
+            .list("symbols", symbols)
+            .list("saturates", saturates)
+            .unless(&false, "modes seen", modes_seen)
+            .end();
+    }
+}
+
+impl Canonical for Case {
+    fn write(&self, digest: &mut Digest) {
+        let Self {
+            modes,
+            actions,
+            motion:
+                MotionLaw {
+                    a,
+                    b,
+                    drift,
+                    step,
+                    noise,
+                },
+            sensor:
+                SensorLaw {
+                    h,
+                    read,
+                    noise: sensor_noise,
+                    symbols,
+                    present,
+                },
+        } = self;
+        Fields(digest)
+            .given("modes", modes.as_ref())
+            .given("actions", actions.as_ref())
+            .given("A", a.as_ref())
+            .given("B", b.as_ref())
+            .given("drift", drift.as_ref())
+            .list("step", step)
+            .given("motion noise", noise.as_ref())
+            .given("H", h.as_ref())
+            .list("read", read)
+            .given("sensor noise", sensor_noise.as_ref())
+            .list("symbols", symbols)
+            .given("present", present.as_ref())
             .end();
     }
 }
@@ -321,6 +409,7 @@ impl Canonical for Reward {
             when,
             steps,
             value,
+            formula,
         } = self;
         Fields(digest)
             .given("actions", actions.as_ref())
@@ -329,6 +418,7 @@ impl Canonical for Reward {
             .unless(&When::default(), "when", when)
             .unless(&Steps::ALL, "steps", steps)
             .field("value", value)
+            .given("formula", formula.as_ref())
             .end();
     }
 }
@@ -341,6 +431,7 @@ impl Canonical for Event {
             region,
             when,
             steps,
+            probability,
             becomes,
             reward,
             then,
@@ -351,6 +442,7 @@ impl Canonical for Event {
             .unless(&Region::everywhere(), "region", region)
             .unless(&When::default(), "when", when)
             .unless(&Steps::ALL, "steps", steps)
+            .unless(&1.0, "probability", probability)
             .given("becomes", becomes.as_ref())
             .unless(&0.0, "reward", reward)
             .unless(&Then::default(), "then", then)
@@ -395,12 +487,18 @@ impl Canonical for BeliefSettings {
             level_limit,
             walls,
             hypotheses,
+            tracker,
+            components,
+            cells,
         } = self;
         Fields(digest)
             .field("level tolerance", level_tolerance)
             .field("level limit", level_limit)
             .unless(&WallBelief::default(), "walls", walls)
             .unless(&HypothesisBelief::default(), "hypotheses", hypotheses)
+            .unless(&TrackerKind::default(), "tracker", tracker)
+            .given("components", components.as_ref())
+            .given("cells", cells.as_ref())
             .end();
     }
 }
