@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let clock = Instant::now();
     let evaluation = evaluate(
         &world,
-        &automaton.filter,
+        &automaton.updater,
         &AutomatonRunner::new(&automaton),
         arguments.evaluation.options(),
         &bars,

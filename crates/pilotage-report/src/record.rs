@@ -55,7 +55,7 @@ pub fn record(
         let mut agent = wake_up::WakeUpAgent::new(mdp, &controller, tracking, choice)?;
         run(mdp, &scenario, automaton, &mut agent, take)
     } else {
-        let mut agent = TrackingAgent::new(&automaton.filter, &controller);
+        let mut agent = TrackingAgent::new(&automaton.updater, &controller);
         run(mdp, &scenario, automaton, &mut agent, take)
     };
     let bounds = bounds(model, &frames);

@@ -69,7 +69,7 @@ fn recordings_are_the_runs_of_a_simulation() {
                 .expect("several starts");
                 simulated(&scenario, &mut agent, episode)
             } else {
-                let mut agent = TrackingAgent::new(&automaton.filter, &controller);
+                let mut agent = TrackingAgent::new(&automaton.updater, &controller);
                 simulated(&scenario, &mut agent, episode)
             };
             for most_steps in [7, usize::MAX] {

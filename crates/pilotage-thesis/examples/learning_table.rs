@@ -322,7 +322,7 @@ fn earned(scenario: &Scenario, automaton: &Automaton) -> Evaluation {
     let controller = AutomatonRunner::new(automaton);
     evaluate(
         scenario,
-        &automaton.filter,
+        &automaton.updater,
         &controller,
         EVALUATION,
         &Silent,

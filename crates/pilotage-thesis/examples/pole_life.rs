@@ -58,7 +58,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     println!("|---|---|---|---|---|---|---|");
     let row = |label: &str, nodes: String, policy: &dyn Policy, options: LifeOptions| {
-        let life = life(&scenario, &automaton.filter, policy, options, &Silent);
+        let life = life(&scenario, &automaton.updater, policy, options, &Silent);
         let mean = life
             .mean()
             .map_or(format!("at least {:.0} (95%)", life.at_least()), |mean| {

@@ -403,7 +403,7 @@ pub fn section_3_4_8(context: &Context<'_>) -> Result<Finding> {
                 let policy = AutomatonRunner::new(&learned.automaton);
                 let lived = life(
                     &scenario,
-                    &learned.automaton.filter,
+                    &learned.automaton.updater,
                     &policy,
                     options,
                     &Silent,

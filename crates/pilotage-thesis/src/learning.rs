@@ -90,7 +90,7 @@ fn learn(scenario: &Scenario, seed: u64) -> Result<Learned> {
 pub fn earned(world: &Scenario, automaton: &Automaton, options: Options) -> Evaluation {
     evaluate(
         world,
-        &automaton.filter,
+        &automaton.updater,
         &AutomatonRunner::new(automaton),
         options,
         &Silent,
@@ -296,7 +296,7 @@ pub fn section_4_3_6(context: &Context<'_>) -> Result<Finding> {
             let policy = AutomatonRunner::new(&learned.automaton);
             let lived = life(
                 &scenario,
-                &learned.automaton.filter,
+                &learned.automaton.updater,
                 &policy,
                 options,
                 &Silent,

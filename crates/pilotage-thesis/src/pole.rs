@@ -29,7 +29,7 @@ pub fn section_5_5_5(context: &Context<'_>) -> Result<Finding> {
             ..PolicySearch::survival()
         };
         let found = policy_search::search(&mdp, &settings, context.seed, context.observer)?;
-        let filter = found.filter.clone();
+        let filter = found.updater.clone();
         let (regulator, _) = tuned(&mdp, context.either(1.0, 0.02))?;
         let open_loop = |horizon, group| {
             let settings = branches::Settings {

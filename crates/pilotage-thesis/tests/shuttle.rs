@@ -30,7 +30,7 @@ fn a_longer_memory_finds_which_way_the_shuttle_faces_and_merges_into_a_handful_o
     let best = baselines(&scenario, &told, options(2_000), &Silent).unwrap()[0].earned;
     let share = |learned: &Learned| {
         let (filter, policy) = (
-            &learned.automaton.filter,
+            &learned.automaton.updater,
             AutomatonRunner::new(&learned.automaton),
         );
         let earned = evaluate(&scenario, filter, &policy, options(500), &Silent);

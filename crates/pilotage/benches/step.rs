@@ -103,7 +103,7 @@ fn synthetic(nodes: usize, matching: Matching) -> Automaton {
 /// A step is one decision and one observation.
 fn run(bencher: Bencher, automaton: &Automaton) {
     let mut controller = AutomatonRunner::new(automaton);
-    let observation = vec![0.2; automaton.filter.readings()];
+    let observation = vec![0.2; automaton.updater.readings()];
     bencher.bench_local(|| {
         let (_, action) = black_box(controller.decide());
         controller.observe(action, black_box(&observation));

@@ -40,7 +40,7 @@ fn a_controller_allocates_nothing_in_a_step() {
         for matching in [Matching::Nearest, Matching::Segments] {
             let automaton = automaton(name, matching);
             let mut controller = AutomatonRunner::new(&automaton);
-            let observation = vec![0.1; automaton.filter.readings()];
+            let observation = vec![0.1; automaton.updater.readings()];
             let mut nodes = 0;
             let counted = allocation_counter::measure(|| {
                 for time in 0..200 {

@@ -65,7 +65,7 @@ fn hurried() -> Settings {
 
 fn earned(scenario: &Scenario, automaton: &Automaton) -> Evaluation {
     let controller = AutomatonRunner::new(automaton);
-    evaluate(scenario, &automaton.filter, &controller, OPTIONS, &Silent)
+    evaluate(scenario, &automaton.updater, &controller, OPTIONS, &Silent)
 }
 
 fn planned(scenario: &Scenario) -> Evaluation {

@@ -93,7 +93,7 @@ fn check_automaton(mdp: &BeliefMdp, automaton: &Automaton, what: &str) {
         );
     }
     let length = mdp.model().episode.length.min(60);
-    for run in rollout::decisions(mdp, &automaton.filter, automaton, 3, length, 5) {
+    for run in rollout::decisions(mdp, &automaton.updater, automaton, 3, length, 5) {
         let mut controller = AutomatonRunner::new(automaton);
         // A model with several starts is run from each; the controller begins at the first.
         if run[0].belief != *controller.belief() {

@@ -183,7 +183,7 @@ fn the_probability_of_failing_foretells_life() {
     };
     let counted = life(
         &Scenario::assumed(&model),
-        &automaton.filter,
+        &automaton.updater,
         &policy,
         options,
         &Silent,

@@ -86,7 +86,7 @@ fn the_hallway_is_learned_in_three_regions_as_well_as_it_can_be_planned() {
         let controller = AutomatonRunner::new(&learned.automaton);
         let earned = evaluate(
             &scenario,
-            &learned.automaton.filter,
+            &learned.automaton.updater,
             &controller,
             options,
             &Silent,
@@ -119,7 +119,7 @@ fn a_hidden_load_becomes_nodes_at_the_same_place_with_opposite_actions() {
     for action in 0..2 {
         let difference = compare(
             &scenario,
-            &learned.automaton.filter,
+            &learned.automaton.updater,
             &AutomatonRunner::new(&learned.automaton),
             &AutomatonRunner::new(&one_way(action)),
             Options {
@@ -494,7 +494,7 @@ fn a_pole_is_balanced_by_a_few_regions_of_its_own_motion() {
     let controller = AutomatonRunner::new(&learned.automaton);
     let life = life(
         &scenario,
-        &learned.automaton.filter,
+        &learned.automaton.updater,
         &controller,
         options,
         &Silent,

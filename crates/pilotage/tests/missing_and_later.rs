@@ -248,7 +248,7 @@ fn a_policy_goes_on_without_a_reading() {
             seed: 2,
         };
         let runner = AutomatonRunner::new(&policy);
-        pilotage::simulate::evaluate(scenario, &policy.filter, &runner, options, &Silent)
+        pilotage::simulate::evaluate(scenario, &policy.updater, &runner, options, &Silent)
             .discounted
             .mean
     };

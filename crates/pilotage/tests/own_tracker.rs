@@ -151,7 +151,7 @@ fn a_histogram_that_knows_of_walls_takes_the_place_of_the_filter() {
     let earned = |tracking: &dyn Tracking| {
         evaluate(&scenario, tracking, &policy, options, &Silent).discounted
     };
-    let (filter, histogram) = (earned(&automaton.filter), earned(&cells));
+    let (filter, histogram) = (earned(&automaton.updater), earned(&cells));
     let gained = histogram.mean - filter.mean;
     let stderr = filter.stderr.hypot(histogram.stderr);
     assert!(gained > 5.0 * stderr, "{filter:?} and {histogram:?}");

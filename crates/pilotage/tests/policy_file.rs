@@ -713,7 +713,7 @@ fn runs(automaton: &Automaton) {
         assert!(node < automaton.nodes.len() && action < automaton.actions.len());
         let size = if step % 7 == 0 { LARGEST } else { 0.5 };
         let reading = if step % 2 == 0 { size } else { -size };
-        controller.observe(action, &vec![reading; automaton.filter.readings()]);
+        controller.observe(action, &vec![reading; automaton.updater.readings()]);
         let belief = controller.belief();
         assert!(belief.mean.iter().all(|m| m.abs() <= LARGEST), "{belief:?}");
         assert!(belief.stratum < automaton.levels.len() && belief.mode < automaton.modes.len());

@@ -166,7 +166,7 @@ fn events(scenario: &Scenario, automaton: &Automaton, steps: usize) -> Vec<Event
     let mut world = ProblemWorld::new(scenario);
     let mut controller = AutomatonRunner::new(automaton);
     let mut draws = Streams::new(4, 0);
-    let mut observation = Observation::new(automaton.filter.readings());
+    let mut observation = Observation::new(automaton.updater.readings());
     world.reset(&mut draws);
     let mut events = Vec::new();
     let mut age = 0;
@@ -335,7 +335,7 @@ proptest! {
         let events: Vec<Event> = (0..200)
             .map(|step| {
                 let spread = if step % 9 == 0 { 1e3 } else { 1.5 };
-                let reading = (0..automaton.filter.readings()).map(|_| 1.0 + spread * normal(&mut rng));
+                let reading = (0..automaton.updater.readings()).map(|_| 1.0 + spread * normal(&mut rng));
                 match step % 50 {
                     49 => Event::Start,
                     7 | 31 => Event::Silence,

@@ -29,7 +29,11 @@ fn the_return_is_that_of_value_iteration_where_planes_are_enough() {
         &Silent,
     )
     .unwrap();
-    let Solved::Rule { policy, filter } = &best.policy else {
+    let Solved::Rule {
+        policy,
+        updater: filter,
+    } = &best.policy
+    else {
         panic!("asked for as a rule");
     };
     let found = plan(&quick(), model, &Request::default(), &Silent).unwrap();

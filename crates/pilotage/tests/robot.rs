@@ -77,7 +77,7 @@ fn what_was_learned_elsewhere_earns_its_return_on_the_robot() {
         automaton.check_world(&robot.model, "policy").unwrap();
         let controller = AutomatonRunner::new(automaton);
         let [there, here] = [&plain, &robot]
-            .map(|world| evaluate(world, &automaton.filter, &controller, options, &Silent));
+            .map(|world| evaluate(world, &automaton.updater, &controller, options, &Silent));
         assert!(
             here.discounted.mean >= 0.85 * there.discounted.mean
                 && here.undiscounted.mean >= 0.85 * there.undiscounted.mean,

@@ -203,7 +203,7 @@ impl Map<'_> {
 
     /// The mode or memory at the start.
     fn start_mode(&self) -> ModeId {
-        let start = |automaton: &Automaton| automaton.filter.initial().mode;
+        let start = |automaton: &Automaton| automaton.updater.start().belief().mode;
         self.automaton.map_or(self.mdp.start().mode, start)
     }
 

@@ -40,8 +40,9 @@ impl Run {
         );
         let automaton = &learned.automaton;
         let controller = AutomatonRunner::new(automaton);
-        let earned =
-            |world: &Scenario| evaluate(world, &automaton.filter, &controller, EVALUATION, &Silent);
+        let earned = |world: &Scenario| {
+            evaluate(world, &automaton.updater, &controller, EVALUATION, &Silent)
+        };
         Self {
             seed,
             earned: earned(scenario),
@@ -87,7 +88,7 @@ impl Pole {
         let controller = AutomatonRunner::new(&learned.automaton);
         let life = life(
             scenario,
-            &learned.automaton.filter,
+            &learned.automaton.updater,
             &controller,
             options,
             &Silent,

@@ -53,6 +53,9 @@ pub trait Keeping: Send + Sync {
     /// A belief in full.
     type Full: Clone + Send + Sync;
 
+    /// Number of actions.
+    fn actions(&self) -> usize;
+
     /// What is believed at the start.
     fn start(&self) -> Self::Full;
 

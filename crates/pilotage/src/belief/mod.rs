@@ -11,6 +11,8 @@
 //! [steady state](riccati), and probabilities under a [Gaussian](gaussian). A [`HypothesisTracker`] keeps several beliefs with a weight
 //! each, and [`Recall`] remembers where beliefs were.
 
+mod cells;
+mod codebook;
 mod filter;
 mod full;
 pub mod gaussian;
@@ -23,8 +25,13 @@ mod nearby;
 mod reading;
 pub(crate) mod recall;
 pub mod riccati;
+mod space;
+mod sum;
 mod tracker;
+mod updater;
 
+pub use cells::{Cells, CellsKeeping};
+pub use codebook::{Codebook, Stratum};
 pub(crate) use filter::is_kept;
 pub use filter::{Belief, Filter, LARGEST};
 pub use full::{Acted, Keeping, Moments, Sensed};
@@ -35,4 +42,7 @@ pub use mdp::{BeliefMdp, Survival};
 pub use reading::Reading;
 pub(crate) use recall::ClusterId;
 pub use recall::{Clusters, Recall};
+pub use space::{BeliefSpace, CodedSpace};
+pub use sum::{Sum, SumKeeping};
 pub use tracker::{KalmanTracker, Tracker, Tracking};
+pub use updater::{Coded, Held, Updater};

@@ -438,6 +438,7 @@ impl ModelBuilder {
             actions: self.actions,
             belief: self.belief,
             map: None,
+            text: ModelText::default(),
         };
         model.validate()?;
         Ok(model)

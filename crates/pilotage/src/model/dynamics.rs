@@ -134,7 +134,7 @@ impl Dynamics {
         });
         Self {
             states: model.state_dim(),
-            readings: model.observation_dim(),
+            readings: model.sensor_dim(),
             symbols: model.laws.symbols.len(),
             modes: model.modes.len(),
             actions: model.actions.len(),

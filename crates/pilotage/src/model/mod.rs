@@ -27,6 +27,8 @@ pub(crate) mod map;
 mod region;
 pub(crate) mod validate;
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -92,6 +94,18 @@ pub struct Model {
     pub belief: BeliefSettings,
     /// Walls and marked cells of a grid map, known to the agent's planner.
     pub map: Option<Map>,
+    /// Text of the model file it was read from, which goes with policies whose beliefs are kept by formulas.
+    pub text: ModelText,
+}
+
+/// The text that a model was read from, if it was. Models that say the same are the same, whatever their text.
+#[derive(Debug, Clone, Default)]
+pub struct ModelText(pub Option<Arc<str>>);
+
+impl PartialEq for ModelText {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// One component of the state.
@@ -388,9 +402,14 @@ impl Model {
         self.state.len()
     }
 
-    /// Number of sensor readings, `m`.
-    pub fn observation_dim(&self) -> usize {
+    /// Number of sensor readings, `m`; 0 for a discrete sensor.
+    pub fn sensor_dim(&self) -> usize {
         self.sensor.h.nrows()
+    }
+
+    /// How many numbers are read after a step: those of the sensor, and that of the mode where it is seen.
+    pub fn observation_dim(&self) -> usize {
+        self.sensor_dim() + usize::from(self.laws.modes_seen)
     }
 
     /// Number of the phase that a step of an episode belongs to: 0 is that of [`Model::motion`] and [`Model::sensor`], then those of
@@ -436,13 +455,92 @@ impl Model {
     /// Whether motion and sensing are linear, with Gaussian noise that no place and no mode changes, events are certain where they
     /// happen, and rewards are numbers: whether uncertainty levels follow it.
     pub fn is_linear(&self) -> bool {
-        self.laws == Laws::default()
-            && self
-                .state
+        self.beyond_linear().is_empty()
+    }
+
+    /// What in it is not linear, in words.
+    pub(crate) fn beyond_linear(&self) -> Vec<&'static str> {
+        let laws = &self.laws;
+        let cases = || laws.cases.iter();
+        let parts = [
+            (
+                cases().any(|case| !case.motion.step.is_empty()),
+                "motion by formula",
+            ),
+            (
+                cases().any(|case| !case.sensor.read.is_empty()),
+                "a sensor by formula",
+            ),
+            (
+                cases().any(|case| case.motion.noise.is_some() || case.sensor.noise.is_some()),
+                "noise that depends on the state or the case",
+            ),
+            (
+                cases().any(|case| case.sensor.present.is_some()),
+                "readings that are missing by place",
+            ),
+            (
+                cases().any(|case| {
+                    let motion = &case.motion;
+                    let moved = motion.a.is_some() || motion.b.is_some() || motion.drift.is_some();
+                    moved || case.sensor.h.is_some()
+                }),
+                "matrices by mode or action",
+            ),
+            (!laws.symbols.is_empty(), "a discrete sensor"),
+            (!laws.saturates.is_empty(), "readings that saturate"),
+            (laws.modes_seen, "modes that are seen"),
+            (
+                self.state
+                    .iter()
+                    .any(|variable| variable.kind != VariableKind::Real),
+                "variables that are whole numbers or angles",
+            ),
+            (
+                self.events.iter().any(|event| event.probability < 1.0),
+                "events by chance",
+            ),
+            (
+                self.rewards.iter().any(|reward| reward.formula.is_some()),
+                "rewards by formula",
+            ),
+        ];
+        let said = parts.into_iter().filter(|(says, _)| *says);
+        said.map(|(_, part)| part).collect()
+    }
+
+    /// What keeps its belief: what [`BeliefSettings::tracker`] says or, by itself, the Kalman filter wherever nothing about state and mode is
+    /// lost by it, cells for a discrete sensor, and a sum of Gaussians elsewhere.
+    pub fn tracker(&self) -> TrackerKind {
+        let one_start = self.start.len() == 1
+            || self.belief.hypotheses == HypothesisBelief::Track
+            || self
+                .start
                 .iter()
-                .all(|variable| variable.kind == VariableKind::Real)
-            && self.events.iter().all(|event| event.probability == 1.0)
-            && self.rewards.iter().all(|reward| reward.formula.is_none())
+                .all(|start| start.mode == self.start[0].mode)
+                && !self.moves();
+        let exact = self.is_linear()
+            && self.modes.len() == 1
+            && self.belief.walls == WallBelief::Ignore
+            && one_start;
+        match self.belief.tracker {
+            TrackerKind::Auto if exact => TrackerKind::Linear,
+            TrackerKind::Auto if !self.laws.symbols.is_empty() => TrackerKind::Cells,
+            TrackerKind::Auto => TrackerKind::Sum,
+            chosen => chosen,
+        }
+    }
+
+    /// Whether any action moves the state, or noise does.
+    fn moves(&self) -> bool {
+        let n = self.state_dim();
+        self.phases().any(|step| {
+            self.motion_at(step).a != DMatrix::identity(n, n)
+                || (0..self.actions.len()).any(|action| {
+                    self.motion_noise(action, step).amax() > 0.0
+                        || self.displacement(action, step).amax() > 0.0
+                })
+        })
     }
 
     /// Steps at which phases begin.

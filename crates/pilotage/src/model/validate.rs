@@ -133,7 +133,7 @@ impl Model {
         let controls = self.motion.b.ncols();
         let place = path("motion").key("B");
         at_most(controls, MOST_DIMENSIONS, "controls", place)?;
-        let m = self.observation_dim();
+        let m = self.sensor_dim();
         let place = path("sensor").key("H");
         at_most(m, MOST_DIMENSIONS, "sensor readings", place)?;
         self.check_sensor(&self.sensor, path("sensor"))?;
@@ -186,7 +186,7 @@ impl Model {
     }
 
     fn check_sensor(&self, sensor: &Sensor, path: Path) -> Result<(), Fault> {
-        let (n, m) = (self.state_dim(), self.observation_dim());
+        let (n, m) = (self.state_dim(), self.sensor_dim());
         let variables = format!("there are {n} state variables");
         let rows = if self.laws.symbols.is_empty() {
             m.max(1)
@@ -213,7 +213,7 @@ impl Model {
     fn readings(&self) -> String {
         format!(
             "the sensor has {} readings, the rows of H",
-            self.observation_dim()
+            self.sensor_dim()
         )
     }
 
@@ -239,7 +239,7 @@ impl Model {
             if let Some(noise) = &action.sensor_noise {
                 covariance(
                     noise,
-                    self.observation_dim(),
+                    self.sensor_dim(),
                     &self.readings(),
                     path.key("sensor_noise"),
                 )?;

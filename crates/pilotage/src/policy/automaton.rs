@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::belief::{Belief, BeliefMdp, Filter, StratumId};
+use crate::belief::{Belief, BeliefSpace, StratumId, Updater};
 use crate::model::{ActionId, Fingerprint, ModeId};
 use crate::policy::{Coordinates, Policy};
 
@@ -39,8 +39,8 @@ pub struct Automaton {
     pub scale: Vec<f64>,
     /// The nodes.
     pub nodes: Vec<Node>,
-    /// The filter that keeps the belief.
-    pub filter: Filter,
+    /// What keeps the belief.
+    pub updater: Updater,
 }
 
 /// How a belief finds its node among those of its level and mode.
@@ -195,8 +195,8 @@ impl Place {
 
 impl Automaton {
     /// An automaton without nodes for a problem.
-    pub fn new(mdp: &BeliefMdp, solver: &str, matching: Matching) -> Self {
-        let model = mdp.model();
+    pub fn new(space: &dyn BeliefSpace, solver: &str, matching: Matching) -> Self {
+        let model = space.model();
         Self {
             problem: model.name.clone(),
             fingerprint: model.fingerprint(),
@@ -213,14 +213,14 @@ impl Automaton {
                 .map(|action| action.name.clone())
                 .collect(),
             modes: model.modes.clone(),
-            levels: (0..mdp.strata())
-                .map(|level| mdp.covariance(level).transpose().as_slice().to_vec())
+            levels: (0..space.strata())
+                .map(|level| space.covariance(level).transpose().as_slice().to_vec())
                 .collect(),
             planned_value: None,
             coordinates: None,
             scale: vec![1.0; model.state_dim()],
             nodes: Vec::new(),
-            filter: mdp.filter(),
+            updater: space.updater(),
         }
     }
 

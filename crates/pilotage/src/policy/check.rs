@@ -8,13 +8,13 @@ use nalgebra::DMatrix;
 
 use super::coordinates::MOST_COORDINATES;
 use super::file::{
-    CoordinateTable, Ends, FilterTable, LevelTable, MapTable, MemoryTable, NodeTable, PolicyTable,
-    RecallTable, Rows, SideTable, StepTable, SwitchTable, WallsTable,
+    BeliefTable, CoordinateTable, Ends, FilterTable, LevelTable, MapTable, MemoryTable, NodeTable,
+    PolicyTable, RecallTable, Rows, SideTable, StepTable, StratumTable, SwitchTable, WallsTable,
 };
 use super::{Matching, Place};
 use crate::belief::LARGEST;
 use crate::error::is_unseen;
-use crate::model::{Path, Step};
+use crate::model::{Path, Step, TrackerKind};
 
 /// A covariance may miss symmetry and a least eigenvalue of 0 by this share of the largest entry of all levels: what rounding does.
 const ROUNDING: f64 = 1e-9;
@@ -113,10 +113,20 @@ impl PolicyTable {
     pub(super) fn check(&self) -> Checked {
         let sizes = Sizes {
             states: self.states.len(),
-            readings: self.filter.h.len(),
+            readings: match &self.filter {
+                Some(filter) => filter.h.len(),
+                // The laws of the model say how many there are: here all nodes have to agree.
+                None => {
+                    let mut observed = self.nodes.iter().filter_map(|node| node.observed.as_ref());
+                    observed.next().map_or(0, |observed| observed.mean.len())
+                }
+            },
             actions: self.actions.len(),
             modes: self.modes.len(),
-            levels: self.filter.levels.len(),
+            levels: match (&self.filter, &self.belief) {
+                (Some(filter), _) => filter.levels.len(),
+                (None, belief) => belief.as_ref().map_or(0, |belief| belief.strata.len()),
+            },
             nodes: self.nodes.len(),
             coordinates: match &self.coordinates {
                 None => self.states.len(),
@@ -130,12 +140,20 @@ impl PolicyTable {
         names(&self.actions).at("actions")?;
         some(&self.modes).at("modes")?;
         each(&self.modes, |name| plain(name)).at("modes")?;
-        sizes.level(self.start.level).at("level").at("start")?;
-        sizes.mode(&self.start.mode).at("mode").at("start")?;
-        vector(&self.start.mean, sizes.states)
-            .at("mean")
-            .at("start")?;
-        self.filter.check(&sizes).at("filter")?;
+        if let Some(start) = &self.start {
+            sizes.level(start.level).at("level").at("start")?;
+            sizes.mode(&start.mode).at("mode").at("start")?;
+            vector(&start.mean, sizes.states).at("mean").at("start")?;
+        }
+        match (&self.filter, &self.start, &self.belief) {
+            (Some(filter), Some(_), None) => filter.check(&sizes).at("filter")?,
+            (None, None, Some(belief)) => belief.check(&sizes).at("belief")?,
+            _ => {
+                return Err(Fault::new(
+                    "either `filter` and `start`, or `belief` and neither of them".to_owned(),
+                ));
+            }
+        }
         if let Some(memory) = &self.memory {
             memory.check(&sizes).at("memory")?;
         }
@@ -208,6 +226,45 @@ impl FilterTable {
             Some(walls) => walls.check(sizes).at("walls"),
             None => Ok(()),
         }
+    }
+}
+
+impl BeliefTable {
+    fn check(&self, sizes: &Sizes) -> Checked {
+        if !matches!(self.tracker, TrackerKind::Sum | TrackerKind::Cells) {
+            return Err(Fault::new("`sum` or `cells` belongs here")).at("tracker");
+        }
+        vector(&self.certain, sizes.states).at("certain")?;
+        each(&self.certain, |certain| match *certain > 0.0 {
+            true => Ok(()),
+            false => Err(Fault::new(format!("{certain} where more than 0 belongs"))),
+        })
+        .at("certain")?;
+        some(&self.strata).at("strata")?;
+        let entries = self
+            .strata
+            .iter()
+            .flat_map(|stratum| stratum.covariance.iter());
+        let largest = entries
+            .flatten()
+            .fold(0.0, |largest: f64, entry| largest.max(entry.abs()));
+        each(
+            &self.strata,
+            |StratumTable {
+                 covariance: matrix_,
+                 modes,
+             }| {
+                matrix(matrix_, sizes.states, sizes.states).at("covariance")?;
+                covariance(matrix_, largest).at("covariance")?;
+                vector(modes, sizes.modes).at("modes")?;
+                let sum: f64 = modes.iter().sum();
+                match modes.iter().all(|weight| *weight >= 0.0) && (sum - 1.0).abs() < 1e-6 {
+                    true => Ok(()),
+                    false => Err(Fault::new("no probabilities that sum to 1")).at("modes"),
+                }
+            },
+        )
+        .at("strata")
     }
 }
 

@@ -2,13 +2,15 @@
 
 use super::check::{At, Checked, Fault};
 use super::file::{
-    CoordinateTable, Ends, FilterTable, LevelTable, MapTable, MemoryTable, NodeTable,
+    BeliefTable, CoordinateTable, Ends, FilterTable, LevelTable, MapTable, MemoryTable, NodeTable,
     ObservedTable, PhaseTable, PolicyTable, RecallTable, Rows, SideTable, StartTable, StepTable,
-    SwitchTable, WallsTable,
+    StratumTable, SwitchTable, WallsTable,
 };
 use super::{Automaton, Coordinates, Node, Observed};
-use crate::belief::{Clusters, Filter, Recall};
-use crate::model::{Barriers, Interval, Region, Step, Steps, Switch, map};
+use std::sync::Arc;
+
+use crate::belief::{Clusters, Codebook, Filter, Recall, Updater};
+use crate::model::{Barriers, Fingerprint, Interval, Model, Region, Step, Steps, Switch, map};
 
 /// Rows of a matrix that lies row by row in `numbers`.
 fn rows(numbers: &[f64], columns: usize) -> Rows {
@@ -36,7 +38,13 @@ impl PolicyTable {
     /// # Errors
     /// A fault where the automaton's levels and actions are not those of its filter.
     pub(super) fn new(automaton: &Automaton) -> Checked<Self> {
-        let filter = &automaton.filter;
+        let filter = automaton.updater.filter();
+        let start = |filter: &Filter| StartTable {
+            level: filter.start.0,
+            mode: filter.start.1,
+            mean: filter.start.2.clone(),
+        };
+        let table = |filter| FilterTable::new(filter, &automaton.levels).at("filter");
         Ok(Self {
             problem: automaton.problem.clone(),
             fingerprint: automaton.fingerprint,
@@ -45,20 +53,19 @@ impl PolicyTable {
             states: automaton.states.clone(),
             actions: automaton.actions.clone(),
             modes: automaton.modes.clone(),
-            start: StartTable {
-                level: filter.start.0,
-                mode: filter.start.1,
-                mean: filter.start.2.clone(),
-            },
-            filter: FilterTable::new(filter, &automaton.levels).at("filter")?,
-            memory: memory(filter),
+            start: filter.map(start),
+            filter: filter.map(table).transpose()?,
+            belief: belief_table(automaton).at("belief")?,
+            memory: filter.and_then(memory),
             matching: automaton.matching,
             coordinates: automaton.coordinates.as_ref().map(coordinate_tables),
             scale: automaton.scale.clone(),
             nodes: automaton
                 .nodes
                 .iter()
-                .map(|node| NodeTable::new(node, filter.readings))
+                .map(|node| {
+                    NodeTable::new(node, node.observed.as_ref().map_or(0, |o| o.mean.len()))
+                })
                 .collect(),
         })
     }
@@ -68,8 +75,17 @@ impl PolicyTable {
     /// # Errors
     /// A fault of the map's drawing.
     pub(super) fn automaton(self) -> Checked<Automaton> {
-        let levels = self.filter.levels.iter();
-        let levels = levels.map(|level| level.covariance.concat()).collect();
+        let levels = match (&self.filter, &self.belief) {
+            (Some(filter), _) => {
+                let levels = filter.levels.iter();
+                levels.map(|level| level.covariance.concat()).collect()
+            }
+            (None, Some(belief)) => {
+                let strata = belief.strata.iter();
+                strata.map(|stratum| stratum.covariance.concat()).collect()
+            }
+            (None, None) => Vec::new(),
+        };
         let (switches, recall) = match self.memory {
             None => (Vec::new(), None),
             Some(MemoryTable::Switches(switches)) => (
@@ -85,10 +101,18 @@ impl PolicyTable {
             fingerprint: self.fingerprint,
             solver: self.solver,
             matching: self.matching,
-            filter: Filter {
-                switches,
-                recall,
-                ..self.filter.filter(self.start).at("filter")?
+            updater: match (self.filter, self.start, self.belief) {
+                (Some(filter), Some(start), _) => Updater::Linear(Filter {
+                    switches,
+                    recall,
+                    ..filter.filter(start).at("filter")?
+                }),
+                (_, _, Some(belief)) => belief.updater(self.fingerprint).at("belief")?,
+                _ => {
+                    return Err(Fault::new(
+                        "neither a filter with a start nor a belief".to_owned(),
+                    ));
+                }
             },
             states: self.states,
             actions: self.actions,
@@ -105,6 +129,60 @@ impl PolicyTable {
             scale: self.scale,
             nodes: self.nodes.into_iter().map(NodeTable::node).collect(),
         })
+    }
+}
+
+/// The belief that an automaton keeps in full, if it does.
+///
+/// # Errors
+/// A fault where the model that keeps it was not read from a text, or has changed since.
+fn belief_table(automaton: &Automaton) -> Checked<Option<BeliefTable>> {
+    let Some(codebook) = automaton.updater.codebook() else {
+        return Ok(None);
+    };
+    let n = automaton.states.len();
+    let text = automaton.updater.model_text();
+    let text = text.ok_or_else(|| {
+        Fault::new("its beliefs are kept by the laws of a model that a program made; write the model as a file and read it, so that the file goes with the policy".to_owned())
+    })?;
+    let strata = (0..codebook.len()).map(|id| {
+        let stratum = codebook.stratum(id);
+        StratumTable {
+            covariance: rows(&stratum.covariance, n),
+            modes: stratum.weights.clone(),
+        }
+    });
+    let table = BeliefTable {
+        tracker: automaton.updater.kind(),
+        model: text.to_owned(),
+        certain: codebook.floors().to_vec(),
+        strata: strata.collect(),
+    };
+    table.model(automaton.fingerprint).at("model")?;
+    Ok(Some(table))
+}
+
+impl BeliefTable {
+    /// The model by whose laws the belief is kept, which has to be that of the policy.
+    fn model(&self, fingerprint: Fingerprint) -> Checked<Model> {
+        let read = crate::scenario::read(&self.model, "the model of a policy");
+        let model = read.map_err(|error| Fault::new(error.to_string()))?.model;
+        match model.fingerprint() == fingerprint {
+            true => Ok(model),
+            false => Err(Fault::new(format!(
+                "its fingerprint is {}, and that of the policy {fingerprint}",
+                model.fingerprint()
+            ))),
+        }
+    }
+
+    fn updater(self, fingerprint: Fingerprint) -> Checked<Updater> {
+        let model = self.model(fingerprint).at("model")?;
+        let strata = self.strata.into_iter();
+        let strata = strata.map(|stratum| (stratum.covariance.concat(), stratum.modes));
+        let codebook = Arc::new(Codebook::of(self.certain, strata));
+        Updater::coded(&model, self.tracker, codebook)
+            .map_err(|error| Fault::new(error.to_string()))
     }
 }
 

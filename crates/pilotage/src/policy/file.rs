@@ -5,7 +5,7 @@ use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 
 use super::{Matching, Place};
-use crate::model::{Fingerprint, When};
+use crate::model::{Fingerprint, TrackerKind, When};
 
 /// Version of the file format; a file of another is refused.
 pub(super) const FORMAT: u64 = 2;
@@ -62,10 +62,15 @@ pub(super) struct PolicyTable {
     /// Names of the modes: hidden modes of the world, or what is remembered. Where there is only one its name may be empty.
     #[schemars(length(min = 1))]
     pub modes: Vec<String>,
-    /// The belief before anything was observed.
-    pub start: StartTable,
-    /// How the belief follows actions and readings.
-    pub filter: FilterTable,
+    /// The belief before anything was observed, where a filter keeps it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<StartTable>,
+    /// How the belief follows actions and readings, where uncertainty levels follow the model. Either this, with `start`, or `belief`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filter: Option<FilterTable>,
+    /// A belief that is kept in full, by the laws of the model itself, and read as one of these strata and a mean.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub belief: Option<BeliefTable>,
     /// How the mode follows them. Default: it stays as it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub memory: Option<MemoryTable>,
@@ -80,6 +85,32 @@ pub(super) struct PolicyTable {
     /// The nodes, at least one.
     #[schemars(length(min = 1))]
     pub nodes: Vec<NodeTable>,
+}
+
+/// A belief that is kept in full.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct BeliefTable {
+    /// What keeps it: `sum` for weighted Gaussians, `cells` for probabilities of cells.
+    pub tracker: TrackerKind,
+    /// The model file by whose laws it is kept, word for word.
+    pub model: String,
+    /// Standard deviations below which a belief counts as certain, n numbers above 0.
+    pub certain: Vec<f64>,
+    /// The strata, at least one. A belief is read as the nearest, by the logarithms of standard deviations, the correlations, and twice the
+    /// square roots of the probabilities of modes.
+    #[schemars(length(min = 1))]
+    pub strata: Vec<StratumTable>,
+}
+
+/// A stratum: everything about a belief but its mean.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct StratumTable {
+    /// Covariance, n x n.
+    pub covariance: Vec<Vec<f64>>,
+    /// Probability of each mode; they sum to 1.
+    pub modes: Vec<f64>,
 }
 
 /// A belief: how uncertain, in which mode, where.

@@ -1,6 +1,6 @@
 //! An automaton laid out flat, to be run: a step allocates nothing.
 
-use crate::belief::{Belief, Filter, Reading};
+use crate::belief::{Belief, Held, Reading, Updater};
 use crate::model::ActionId;
 use crate::policy::{Automaton, Coordinates, MOST_COORDINATES, Matching, NodeId, Place, Policy};
 
@@ -10,7 +10,7 @@ const LANES: usize = 8;
 /// Runs an automaton: keeps its belief, matches its nodes.
 #[derive(Debug, Clone)]
 pub struct AutomatonRunner {
-    filter: Filter,
+    updater: Updater,
     matching: Matching,
     coordinates: Option<Coordinates>,
     levels: usize,
@@ -23,14 +23,13 @@ pub struct AutomatonRunner {
     nodes: Vec<(NodeId, ActionId)>,
     /// Inverse of the scale.
     inverse: Vec<f64>,
-    belief: Belief,
-    scratch: Vec<f64>,
+    held: Held,
 }
 
 impl AutomatonRunner {
     /// Lays out an automaton. One without nodes does action 0 everywhere.
     pub fn new(automaton: &Automaton) -> Self {
-        let filter = automaton.filter.clone();
+        let updater = automaton.updater.clone();
         let levels = automaton.levels.len();
         let mut controller = Self {
             matching: automaton.matching,
@@ -40,9 +39,8 @@ impl AutomatonRunner {
             rows: Vec::new(),
             nodes: Vec::new(),
             inverse: automaton.scale.iter().map(|scale| 1.0 / scale).collect(),
-            belief: filter.initial(),
-            scratch: vec![0.0; filter.states()],
-            filter,
+            held: updater.start(),
+            updater,
         };
         for mode in 0..automaton.modes.len() {
             let own = automaton.of_mode(mode);
@@ -84,23 +82,22 @@ impl AutomatonRunner {
 
     /// The belief.
     pub fn belief(&self) -> &Belief {
-        &self.belief
+        self.held.belief()
     }
 
     /// Back to the start belief.
     pub fn reset(&mut self) {
-        self.filter.reset(&mut self.belief);
+        self.updater.reset(&mut self.held);
     }
 
     /// Node and action at the current belief.
     pub fn decide(&self) -> (NodeId, ActionId) {
-        self.decide_at(&self.belief)
+        self.decide_at(self.held.belief())
     }
 
     /// Takes in what was sensed after an action.
     pub fn observe<'a>(&mut self, action: ActionId, reading: impl Into<Reading<'a>>) {
-        self.filter
-            .update(&mut self.belief, action, reading, &mut self.scratch);
+        self.updater.update(&mut self.held, action, reading.into());
     }
 
     fn decide_at(&self, belief: &Belief) -> (NodeId, ActionId) {

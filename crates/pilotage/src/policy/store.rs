@@ -154,7 +154,7 @@ impl Automaton {
         if self.states != states {
             return Err(fail("state variables", &self.states, states));
         }
-        if self.filter.readings() != world.observation_dim() {
+        if self.updater.readings() != world.observation_dim() {
             return Err(Error::Policy {
                 origin: origin.to_owned(),
                 reason: format!(

@@ -9,7 +9,7 @@ use super::file::ModelFile;
 use super::locate::locate;
 use super::resolve::resolve;
 use crate::files::read as read_file;
-use crate::model::{Fault, ModelError, Place, error, suggest};
+use crate::model::{Fault, ModelError, ModelText, Place, error, suggest};
 
 /// Version of the file format that [`read`] reads.
 const FORMAT: u64 = 1;
@@ -37,7 +37,9 @@ pub fn read(text: &str, origin: &str) -> Result<Scenario, ModelError> {
         let file = toml::de::Deserializer::parse(text)
             .and_then(ModelFile::deserialize)
             .map_err(|error| in_our_words(&error))?;
-        resolve(file).map_err(|fault| placed(text, fault))
+        let mut scenario = resolve(file).map_err(|fault| placed(text, fault))?;
+        scenario.model.text = ModelText(Some(text.into()));
+        Ok(scenario)
     };
     parse().map_err(|(span, message, hint)| ModelError {
         origin: origin.into(),

@@ -93,6 +93,7 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
         episode: episode(&file, &names)?,
         belief: belief(&file),
         map,
+        text: ModelText::default(),
         modes: names.modes,
         name: file.name,
         about: file.about,

@@ -247,6 +247,34 @@ impl Grid {
         sum
     }
 
+    /// The points around a place with their weights, which sum to 1; beyond the edge, those of the edge.
+    pub(crate) fn around(&self, at: &[f64]) -> Vec<(usize, f64)> {
+        let mut around = vec![(0, 1.0)];
+        for ((axis, stride), x) in self.axes.iter().zip(&self.strides).zip(at) {
+            let last = (axis.count - 1) as f64;
+            let position = ((x - axis.low) / axis.step).clamp(0.0, last);
+            let taps = Taps::new(position, self.interpolation);
+            let before = std::mem::take(&mut around);
+            for (offset, weight) in before {
+                for k in 0..taps.count {
+                    let index = (taps.first + k as isize).clamp(0, axis.count as isize - 1);
+                    around.push((offset + index as usize * stride, weight * taps.weights[k]));
+                }
+            }
+        }
+        around
+    }
+
+    /// The point that is nearest to a place.
+    pub(crate) fn nearest(&self, at: &[f64]) -> usize {
+        let axes = self.axes.iter().zip(&self.strides).zip(at);
+        axes.map(|((axis, stride), x)| {
+            let last = (axis.count - 1) as f64;
+            ((x - axis.low) / axis.step).round().clamp(0.0, last) as usize * stride
+        })
+        .sum()
+    }
+
     /// The average of a function around every point: `W(x) = E V(x + e)`, `e ~ N(0, covariance)`.
     pub(crate) fn smoother(&self, covariance: &DMatrix<f64>) -> Smoother {
         let directions = square_root(covariance);

@@ -8,6 +8,7 @@
 //!
 //! | solver | what it does |
 //! |---|---|
+//! | [`CodebookPlanner`] | value iteration on strata and means of beliefs of any kind |
 //! | [`ValueIteration`] | value iteration on levels and means, for models of at most three variables |
 //! | [`Kbvi`] | the thesis' search of action sequences that are fixed in advance |
 //! | [`PolicySearch`] | moves the planes at which actions switch, where no grid fits |
@@ -26,6 +27,7 @@
 
 pub mod arkaq;
 pub mod bound;
+pub mod codebook;
 pub mod compile;
 mod grid;
 pub mod kafaq;
@@ -49,6 +51,7 @@ pub mod value_iteration;
 mod walled;
 
 pub use arkaq::Settings as Arkaq;
+pub use codebook::CodebookPlanner;
 pub use kafaq::Settings as Kafaq;
 pub use kbvi::Kbvi;
 pub use learn::{Course, Learned, Owner, Run, learn as run_course};

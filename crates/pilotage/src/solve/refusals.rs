@@ -52,6 +52,27 @@ pub(super) fn steps_differ(model: &Model) -> Option<String> {
     })
 }
 
+/// Uncertainty levels follow linear models.
+pub(super) fn beyond_levels(model: &Model) -> Option<String> {
+    let parts = model.beyond_linear();
+    (!parts.is_empty()).then(|| {
+        format!(
+            "uncertainty levels follow linear models, and this one has {}; use codebook",
+            parts.join(", ")
+        )
+    })
+}
+
+/// Feedback on the mean alone has no place for what is added at every step.
+pub(super) fn drifts(model: &Model) -> Option<String> {
+    let drifts = model
+        .phases()
+        .any(|step| model.motion_at(step).drift.amax() > 0.0);
+    drifts.then(|| {
+        "its motion has a drift, which this solver does not know; use value-iteration".to_owned()
+    })
+}
+
 /// Planners on a grid need to know where to put it.
 pub(super) fn bound_missing(model: &Model) -> Option<String> {
     let unbounded = model

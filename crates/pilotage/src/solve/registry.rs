@@ -2,12 +2,17 @@
 
 use super::settings::{SettingInfo, Settings};
 use super::solver::{Learner, Planner, Solver};
-use super::{Arkaq, Kafaq, Kbvi, Lqg, Mls, PolicySearch, Qmdp, ValueIteration};
+use super::{Arkaq, CodebookPlanner, Kafaq, Kbvi, Lqg, Mls, PolicySearch, Qmdp, ValueIteration};
 use crate::error::{Error, Result};
 use crate::model::{Model, suggest};
 
 /// Every solver of the library, the first that accepts a model being the one to try first.
-const BUILTIN: [Entry; 8] = [
+const BUILTIN: [Entry; 9] = [
+    Entry::planner::<CodebookPlanner>(
+        "codebook",
+        &[],
+        "value iteration on strata and means of beliefs of any kind",
+    ),
     Entry::planner::<ValueIteration>(
         "value-iteration",
         &["kbvi-closed"],

@@ -1,6 +1,6 @@
 //! Beliefs a policy meets, sampled from the model.
 
-use crate::belief::{Belief, BeliefMdp, Filter, Reading};
+use crate::belief::{Belief, BeliefSpace, Reading, Updater};
 use crate::error::Result;
 use crate::model::ActionId;
 use crate::parallel;
@@ -43,23 +43,17 @@ pub(crate) fn check_runs(setting: &'static str, runs: usize) -> Result<()> {
 ///
 /// Where the start hypotheses of a belief are tracked, the agent is told which of them is true: one policy serves all of them.
 pub fn decisions(
-    mdp: &BeliefMdp,
-    filter: &Filter,
+    space: &dyn BeliefSpace,
+    updater: &Updater,
     policy: &dyn Policy,
     episodes: usize,
     length: usize,
     seed: u64,
 ) -> Vec<Vec<Decision>> {
     let length = length.min(MOST_DECISIONS / episodes.max(1));
-    let model = mdp.model();
+    let model = space.model();
     let scenario = Scenario::assumed(model);
-    let told: Vec<Filter> = match mdp.starts() {
-        [_] => vec![filter.clone()],
-        starts => starts
-            .iter()
-            .map(|(_, start)| filter.clone().starting_at(start))
-            .collect(),
-    };
+    let told = updater.told(space);
     parallel::map(episodes, |episode| {
         let mut world = ProblemWorld::new(&scenario);
         world.reset(&mut Streams::new(seed, episode as u64));

@@ -1,8 +1,8 @@
 //! One way to run any solver: what it finds is brought into the form asked for here, and nowhere else.
 
 use super::rollout::check_runs;
-use super::solver::{Found, Learner, Plan, Planner, Problem, Request, Solver};
-use super::{Form, Solution, Solved, compile};
+use super::solver::{Found, Learner, Plan, Planner, Problem, Request, Solver, accepted, refuse_if};
+use super::{Form, Solution, Solved, compile, refusals};
 use crate::error::Result;
 use crate::model::Model;
 use crate::policy::{Automaton, AutomatonRunner};
@@ -39,9 +39,12 @@ pub fn plan(
 ) -> Result<Solution> {
     check_runs("runs", request.runs)?;
     let problem = Problem::new(model, request);
-    problem.mdp().check()?;
-    planner.accepts(model)?;
-    if planner.makes_automaton(model) {
+    let levels = planner.needs_levels() && model.is_linear();
+    if levels {
+        problem.mdp().check()?;
+    }
+    accepted(planner, model)?;
+    if levels && planner.makes_automaton(model) {
         problem.mdp().check_bounded()?;
     }
     let Plan {
@@ -52,18 +55,19 @@ pub fn plan(
         remarks,
     } = planner.plan(&problem, observer)?;
     let levels = match &policy {
-        Found::Rule { mdp, .. } => mdp.strata(),
+        Found::Rule { space, .. } => space.strata(),
         Found::Automaton(_) | Found::Control(_) => problem.mdp().strata(),
     };
     let policy = match (policy, request.form) {
         (Found::Control(controller), _) => Solved::Control(controller),
-        (Found::Rule { policy, mdp }, Form::Grid) => Solved::Rule {
+        (Found::Rule { policy, space }, Form::Grid) => Solved::Rule {
             policy,
-            filter: mdp.filter(),
+            updater: space.updater(),
         },
-        (Found::Rule { policy, mdp }, Form::Nearest | Form::Segments) => {
+        (Found::Rule { policy, space }, Form::Nearest | Form::Segments) => {
             let settings = compiler(request);
-            let mut automaton = compile::compile(policy.as_ref(), &mdp, planner.name(), &settings)?;
+            let mut automaton =
+                compile::compile(policy.as_ref(), space.as_ref(), planner.name(), &settings)?;
             automaton.planned_value = value;
             Solved::Automaton(automaton)
         }
@@ -103,6 +107,7 @@ pub fn learn(
     let model = &scenario.model;
     check_runs("runs", request.runs)?;
     let problem = Problem::new(model, request);
+    refuse_if(learner.name(), model, refusals::beyond_levels(model))?;
     problem.mdp().check()?;
     learner.accepts(model)?;
     problem.mdp().check_bounded()?;
@@ -144,7 +149,7 @@ fn annotated(mut automaton: Automaton, problem: &Problem, request: &Request) -> 
 
 fn asked_anew(automaton: &Automaton) -> Solved {
     Solved::Rule {
-        filter: automaton.filter.clone(),
+        updater: automaton.updater.clone(),
         policy: Box::new(AutomatonRunner::new(automaton)),
     }
 }

@@ -1,7 +1,7 @@
 //! What a solver hands over, in the form asked for.
 
 use super::lqg::LqgController;
-use crate::belief::Filter;
+use crate::belief::Updater;
 use crate::error::{Error, Result};
 use crate::model::suggest;
 use crate::policy::{Automaton, AutomatonRunner, Matching, Policy};
@@ -111,7 +111,7 @@ pub enum Solved {
         /// The rule.
         policy: Box<dyn Policy>,
         /// Keeps the belief.
-        filter: Filter,
+        updater: Updater,
     },
 }
 
@@ -133,13 +133,13 @@ impl Solution {
         options: Options,
         observer: &dyn Progress,
     ) -> Option<Difference> {
-        let Solved::Rule { policy, filter } = &planner.policy else {
+        let Solved::Rule { policy, updater } = &planner.policy else {
             return None;
         };
         let compiled = AutomatonRunner::new(self.automaton()?);
         let (planner, compiled): (&dyn Policy, &dyn Policy) = (policy.as_ref(), &compiled);
         Some(compare(
-            scenario, filter, planner, compiled, options, observer,
+            scenario, updater, planner, compiled, options, observer,
         ))
     }
 
@@ -156,11 +156,11 @@ impl Solution {
         Ok(match &self.policy {
             Solved::Automaton(automaton) => {
                 let controller = AutomatonRunner::new(automaton);
-                evaluate(scenario, &automaton.filter, &controller, options, observer)
+                evaluate(scenario, &automaton.updater, &controller, options, observer)
             }
             Solved::Control(controller) => controller.evaluate(scenario, options, observer)?,
-            Solved::Rule { policy, filter } => {
-                evaluate(scenario, filter, policy.as_ref(), options, observer)
+            Solved::Rule { policy, updater } => {
+                evaluate(scenario, updater, policy.as_ref(), options, observer)
             }
         })
     }

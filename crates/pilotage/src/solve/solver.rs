@@ -1,10 +1,11 @@
 //! What a solver is: a planner, which is handed a model, or a learner, which is handed worlds to act in as well.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use super::lqg::LqgController;
-use super::{Form, Learning};
-use crate::belief::BeliefMdp;
+use super::{Form, Learning, refusals};
+use crate::belief::{BeliefMdp, BeliefSpace};
 use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::policy::{Automaton, Policy};
@@ -21,6 +22,11 @@ pub trait Planner: Send + Sync {
     /// # Errors
     /// [`Error::Unsupported`] with the reason, and what would do.
     fn accepts(&self, model: &Model) -> Result<()>;
+
+    /// Whether it plans on the uncertainty levels of a linear model; one that does not is handed models of any kind.
+    fn needs_levels(&self) -> bool {
+        true
+    }
 
     /// Plans.
     ///
@@ -102,8 +108,11 @@ impl Solver {
     /// [`Error::Unsupported`] with the reason, and what would do; [`Error::Setting`] for settings out of range.
     pub fn accepts(&self, model: &Model) -> Result<()> {
         match self {
-            Self::Planner(planner) => planner.accepts(model),
-            Self::Learner(learner) => learner.accepts(model),
+            Self::Planner(planner) => accepted(planner.as_ref(), model),
+            Self::Learner(learner) => {
+                refuse_if(learner.name(), model, refusals::beyond_levels(model))?;
+                learner.accepts(model)
+            }
         }
     }
 
@@ -153,7 +162,8 @@ impl Request {
 /// What a solver is handed: what is assumed and what is asked. Nothing true can be reached from here.
 #[derive(Debug, Clone)]
 pub struct Problem {
-    mdp: BeliefMdp,
+    model: Model,
+    mdp: OnceLock<BeliefMdp>,
     form: Form,
     seed: u64,
 }
@@ -162,7 +172,8 @@ impl Problem {
     /// The problem of a model, with what is asked of its solver.
     pub fn new(model: &Model, request: &Request) -> Self {
         Self {
-            mdp: BeliefMdp::new(model),
+            model: model.clone(),
+            mdp: OnceLock::new(),
             form: request.form,
             seed: request.seed,
         }
@@ -170,12 +181,13 @@ impl Problem {
 
     /// The model.
     pub fn model(&self) -> &Model {
-        self.mdp.model()
+        &self.model
     }
 
-    /// The belief decision process of the model.
+    /// The belief decision process of the model on uncertainty levels, for planners that [need](Planner::needs_levels) them: those of a
+    /// model that is not linear are not its own.
     pub fn mdp(&self) -> &BeliefMdp {
-        &self.mdp
+        self.mdp.get_or_init(|| BeliefMdp::new(&self.model))
     }
 
     /// Form in which the policy is wanted. A planner may hand over any; it is brought into this form afterwards.
@@ -207,12 +219,12 @@ pub struct Plan {
 // There is one at a time, so its size does not matter.
 #[allow(clippy::large_enum_variant)]
 pub enum Found {
-    /// A rule that can be asked at every belief of a decision process.
+    /// A rule that can be asked at every belief.
     Rule {
         /// The rule.
         policy: Box<dyn Policy>,
-        /// The decision process, whose levels its beliefs have.
-        mdp: BeliefMdp,
+        /// The beliefs it is asked at.
+        space: Box<dyn BeliefSpace>,
     },
     /// An automaton.
     Automaton(Automaton),
@@ -221,13 +233,13 @@ pub enum Found {
 }
 
 impl Plan {
-    /// A rule for the beliefs of a decision process, which knows what it expects from the start if any does.
-    pub fn rule(policy: impl Policy + 'static, mdp: BeliefMdp) -> Self {
+    /// A rule for beliefs, which knows what it expects from the start if any does.
+    pub fn rule(policy: impl Policy + 'static, space: impl BeliefSpace + 'static) -> Self {
         Self {
-            value: policy.value(mdp.start()),
+            value: policy.value(space.start()),
             ..Self::of(Found::Rule {
                 policy: Box::new(policy),
-                mdp,
+                space: Box::new(space),
             })
         }
     }
@@ -264,6 +276,17 @@ pub struct Lesson {
     pub learning: Learning,
     /// What is to be known of it: where it is not what it seems, and why.
     pub remarks: Vec<String>,
+}
+
+/// Whether a planner is made for a model, and levels follow it where the planner needs them.
+///
+/// # Errors
+/// As [`Planner::accepts`].
+pub(super) fn accepted(planner: &dyn Planner, model: &Model) -> Result<()> {
+    if planner.needs_levels() {
+        refuse_if(planner.name(), model, refusals::beyond_levels(model))?;
+    }
+    planner.accepts(model)
 }
 
 /// Refuses a model, with the reason and what would do.

@@ -1,7 +1,7 @@
 //! A cart with an inverted pole: the nonlinear equations of motion (Eq. 3.6 and 3.9).
 
 use super::linear::LinearSensor;
-use super::{Body, Doing};
+use super::{Body, Doing, Observation};
 use crate::random::{Rng, normal};
 use crate::scenario::{CartPole, Scenario};
 
@@ -35,8 +35,8 @@ impl Body for CartAndPole {
         self.plant.advance(to, force);
     }
 
-    fn sense(&self, doing: Doing, state: &[f64], observation: &mut [f64], rng: &mut Rng) {
-        self.sensor.sense(doing, state, observation, rng);
+    fn sense(&self, doing: Doing, state: &[f64], observation: &mut Observation, rng: &mut Rng) {
+        self.sensor.sense(doing, state, observation.values(), rng);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Linear motion and sensing, `s' = A s + B u + v`, `o = H s + n`, with the true noise and controls where a scenario states them.
 
 use super::noise::Noise;
-use super::{Body, Doing};
+use super::{Body, Doing, Observation};
 use crate::model::{ActionId, ModeId};
 use crate::random::Rng;
 use crate::scenario::Scenario;
@@ -118,7 +118,7 @@ impl Body for Linear {
         motion.noise[doing.action].add_to(to, rng);
     }
 
-    fn sense(&self, doing: Doing, state: &[f64], observation: &mut [f64], rng: &mut Rng) {
-        self.sensor.sense(doing, state, observation, rng);
+    fn sense(&self, doing: Doing, state: &[f64], observation: &mut Observation, rng: &mut Rng) {
+        self.sensor.sense(doing, state, observation.values(), rng);
     }
 }

@@ -5,6 +5,7 @@
 //! is a file for each simulator; what that pays and changes is said by the model's effects.
 
 mod cart_pole;
+mod lawful;
 mod linear;
 mod noise;
 mod observation;
@@ -44,12 +45,13 @@ pub trait World: Send {
     fn mode(&self) -> ModeId;
 }
 
-/// What an agent does: an action in a mode, in a phase of the model.
+/// What an agent does: an action in a mode, at a step of the episode and in the phase of the model that it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Doing {
     mode: ModeId,
     action: ActionId,
     phase: usize,
+    step: usize,
 }
 
 /// What moves and senses in a world. States have length `n`, observations `m`.
@@ -62,8 +64,19 @@ trait Body: Send {
     /// Writes to `to` where an action leads from a state, noise included.
     fn advance(&mut self, doing: Doing, from: &[f64], to: &mut [f64], rng: &mut Rng);
 
-    /// Writes what is sensed in a state after an action, noise included.
-    fn sense(&self, doing: Doing, state: &[f64], observation: &mut [f64], rng: &mut Rng);
+    /// Moves a state that walls have stopped to where it can stand.
+    fn rest(&self, state: &mut [f64]) {
+        let _ = state;
+    }
+
+    /// Probability that something is sensed in a state, where the body knows better than [`crate::model::Sensor::present`].
+    fn present(&self, doing: Doing, state: &[f64]) -> Option<f64> {
+        let _ = (doing, state);
+        None
+    }
+
+    /// Writes what is sensed in a state after an action, noise included. The mode is that afterwards.
+    fn sense(&self, doing: Doing, state: &[f64], observation: &mut Observation, rng: &mut Rng);
 }
 
 /// What a step in the world did.

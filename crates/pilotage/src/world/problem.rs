@@ -1,13 +1,14 @@
 //! The world of a scenario: where it starts, what a step pays and changes. What moves in it is a [`Body`].
 
 use super::cart_pole::CartAndPole;
+use super::lawful::Lawful;
 use super::linear::Linear;
 use super::noise::Noise;
 use super::robot::Driven;
 use super::{Body, Doing, Observation, Step, Streams, World};
 use crate::model::{
-    ActionId, Barriers, EffectTable, ModeId, Model, Outcome, StartHypothesis, StartShape, Tally,
-    Then, When,
+    ActionId, Barriers, EffectTable, ModeId, Model, Outcome, Point, StartHypothesis, StartShape,
+    Tally, Then, When,
 };
 use crate::random::uniform;
 use crate::scenario::{Scenario, Simulator, Walls};
@@ -35,7 +36,8 @@ impl ProblemWorld {
     pub fn new(scenario: &Scenario) -> Self {
         let (model, truth) = (&scenario.model, &scenario.truth);
         let body: Box<dyn Body> = match &truth.simulator {
-            Simulator::Linear => Box::new(Linear::new(scenario)),
+            Simulator::Linear if model.is_linear() => Box::new(Linear::new(scenario)),
+            Simulator::Linear => Box::new(Lawful::new(model)),
             Simulator::CartPole(parameters) => Box::new(CartAndPole::new(scenario, parameters)),
             Simulator::Robot(robot) => Box::new(Driven::new(scenario, robot)),
         };
@@ -65,6 +67,7 @@ impl ProblemWorld {
             mode: self.mode,
             action,
             phase: self.model.phase(self.time),
+            step: self.time,
         }
     }
 
@@ -73,27 +76,43 @@ impl ProblemWorld {
             .advance(doing, &self.state, &mut self.scratch, &mut draws.world);
         if let Some(walls) = &self.walls {
             walls.stop(&self.state, &mut self.scratch);
+            self.body.rest(&mut self.scratch);
         }
         std::mem::swap(&mut self.state, &mut self.scratch);
     }
 
     /// Lets the current state be sensed, unless the reading is missing.
     fn sense(&self, doing: Doing, draws: &mut Streams, observation: &mut Observation) {
-        let present = self.model.sensor_at(self.time).present;
+        let doing = Doing {
+            mode: self.mode,
+            ..doing
+        };
+        let known = self.body.present(doing, &self.state);
+        let present = known.unwrap_or_else(|| self.model.sensor_at(self.time).present);
         // A reading that always comes takes no draw.
         if present < 1.0 && uniform(&mut draws.sensor) >= present {
             return observation.silence();
         }
-        let values = observation.values();
         self.body
-            .sense(doing, &self.state, values, &mut draws.sensor);
+            .sense(doing, &self.state, observation, &mut draws.sensor);
     }
 
     /// Takes in what the step does in the current state; what has happened, if an event has.
-    fn see(&self, when: When, doing: Doing, tally: &mut Tally) -> Option<Outcome> {
+    fn see(
+        &self,
+        when: When,
+        doing: Doing,
+        tally: &mut Tally,
+        draws: &mut Streams,
+    ) -> Option<Outcome> {
         let effects = self.effects.at(self.time, doing.mode, doing.action);
         let now = effects.iter().filter(|effect| effect.when == when);
-        tally.see(now, &self.state)
+        let point = Point {
+            state: &self.state,
+            control: self.model.actions[doing.action].control.as_slice(),
+            step: self.time,
+        };
+        tally.live(now, &point, &mut || uniform(&mut draws.world))
     }
 
     /// Draws a state from the start hypothesis.
@@ -156,7 +175,7 @@ impl World for ProblemWorld {
         let doing = self.doing(action);
         let mut tally = self.model.tally(self.mode, action);
         tally.reward += self.model.running_cost(&self.state, None, action);
-        let before = self.see(When::Before, doing, &mut tally);
+        let before = self.see(When::Before, doing, &mut tally, draws);
         let outcome = before.unwrap_or_else(|| tally.rest());
         self.mode = outcome.mode;
         if outcome.then != Then::Continue {
@@ -170,7 +189,7 @@ impl World for ProblemWorld {
                 failed: true,
             };
         }
-        if let Some(outcome) = self.see(When::After, doing, &mut tally) {
+        if let Some(outcome) = self.see(When::After, doing, &mut tally, draws) {
             self.mode = outcome.mode;
             if outcome.then != Then::Continue {
                 return self.close(tally.reward, outcome.then, draws);

@@ -6,7 +6,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::{Body, Doing};
+use super::{Body, Doing, Observation};
 use crate::model::Model;
 use crate::random::{Rng, normal};
 use crate::scenario::{Robot, Scenario};
@@ -49,7 +49,8 @@ impl Body for Driven {
             .carry_out(&self.displacements[doing.action], to, rng);
     }
 
-    fn sense(&self, _: Doing, _: &[f64], observation: &mut [f64], rng: &mut Rng) {
+    fn sense(&self, _: Doing, _: &[f64], observation: &mut Observation, rng: &mut Rng) {
+        let observation = observation.values();
         self.arena.sense(observation, rng);
     }
 }

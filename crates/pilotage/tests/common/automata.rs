@@ -154,7 +154,7 @@ fn node(automaton: &Automaton, parts: &Parts) -> Node {
         *value,
     );
     if let Some(value) = value {
-        let m = automaton.filter.readings();
+        let m = automaton.updater.readings();
         node.visits = 1.0 / 3.0;
         node.predecessors = vec![(0, value.abs())];
         node.observed = Some(Observed {
@@ -185,7 +185,8 @@ fn recalling(automaton: &mut Automaton, model: &Model) {
     let next = (0..2 * actions * 2).map(|i| (i / 3) % 2).collect();
     let recall = Recall::new(clusters, actions, vec![1, 0], next);
     automaton.modes = vec!["after 1".to_owned(), "after 2".to_owned()];
-    automaton.filter = automaton.filter.clone().recalling(recall);
+    let filter = automaton.updater.filter().expect("a Kalman filter");
+    automaton.updater = filter.clone().recalling(recall).into();
 }
 
 /// Automata of any form, the coordinates of whose places are drawn from `coordinate`.

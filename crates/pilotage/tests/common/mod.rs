@@ -77,6 +77,7 @@ impl System {
                 ..BeliefSettings::default()
             },
             map: None,
+            text: pilotage::model::ModelText::default(),
         }
     }
 }

@@ -214,7 +214,7 @@ fn policies() -> Reader {
 fn use_policy(automaton: &Automaton) {
     let mut controller = AutomatonRunner::new(automaton);
     controller.reset();
-    let readings = automaton.filter.readings();
+    let readings = automaton.updater.readings();
     for reading in [
         0.0,
         1.0,

@@ -176,6 +176,7 @@ impl Canonical for Model {
             episode,
             belief,
             map,
+            text: _,
         } = self;
         let actions: Vec<ActionIn<'_>> = actions
             .iter()

@@ -34,13 +34,13 @@ impl Model {
             })?;
         }
         let saturates = Path::new("sensor").key("saturates");
-        if !laws.saturates.is_empty() && laws.saturates.len() != self.observation_dim() {
+        if !laws.saturates.is_empty() && laws.saturates.len() != self.sensor_dim() {
             return Err(Fault::new(
                 saturates,
                 format!(
                     "{} pairs of ends for {} readings",
                     laws.saturates.len(),
-                    self.observation_dim()
+                    self.sensor_dim()
                 ),
                 "give one pair [low, high] for each reading; `-inf` and `inf` leave a side open",
             ));
@@ -72,7 +72,7 @@ impl Model {
     }
 
     fn check_case(&self, case: &Case, path: &Path) -> Result<(), Fault> {
-        let (n, m) = (self.state_dim(), self.observation_dim());
+        let (n, m) = (self.state_dim(), self.sensor_dim());
         for (i, mode) in case.modes.iter().flatten().enumerate() {
             self.check_mode(Some(*mode), path.clone().key("mode").index(i))?;
         }

@@ -76,7 +76,7 @@ impl Draft {
             )
         };
         automaton.nodes = self.nodes.iter().enumerate().map(node).collect();
-        automaton.filter = task.filter.clone().recalling(self.recall.clone());
+        automaton.updater = task.filter.clone().recalling(self.recall.clone()).into();
         automaton
     }
 }

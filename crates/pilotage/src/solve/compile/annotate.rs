@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::belief::BeliefMdp;
+use crate::belief::BeliefSpace;
 use crate::policy::{Automaton, NodeId, Observed};
 use crate::solve::rollout;
 
 /// Runs the automaton in the model and writes predecessors, observations and visits into its nodes.
-pub fn annotate(automaton: &mut Automaton, mdp: &BeliefMdp, episodes: usize, seed: u64) {
-    let model = mdp.model();
+pub fn annotate(automaton: &mut Automaton, space: &dyn BeliefSpace, episodes: usize, seed: u64) {
+    let model = space.model();
     let m = model.observation_dim();
     let runs = rollout::decisions(
-        mdp,
-        &automaton.filter,
+        space,
+        &automaton.updater,
         automaton,
         episodes,
         model.episode.length,

@@ -14,7 +14,7 @@ pub use annotate::annotate;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-use crate::belief::{Belief, BeliefMdp, StratumId};
+use crate::belief::{Belief, BeliefSpace, StratumId};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, ModeId};
 use crate::policy::{Automaton, Matching, Policy};
@@ -92,7 +92,7 @@ impl Policy for Disturbed<'_> {
 /// [`Error::Setting`] for settings out of range.
 pub fn compile(
     policy: &dyn Policy,
-    mdp: &BeliefMdp,
+    space: &dyn BeliefSpace,
     solver: &str,
     settings: &Settings,
 ) -> Result<Automaton> {
@@ -104,18 +104,18 @@ pub fn compile(
             range: "at least 0 and below 1",
         });
     }
-    let model = mdp.model();
-    let met = meet(mdp, policy, settings);
-    let mut automaton = Automaton::new(mdp, solver, settings.matching);
-    automaton.planned_value = policy.value(mdp.start());
-    for band in bands(mdp, policy, met, settings.slack) {
+    let model = space.model();
+    let met = meet(space, policy, settings);
+    let mut automaton = Automaton::new(space, solver, settings.matching);
+    automaton.planned_value = policy.value(space.start());
+    for band in bands(space, policy, met, settings.slack) {
         if model.state_dim() == 1 {
             intervals::place(&mut automaton, policy, &band);
         } else {
             samples::place(&mut automaton, policy, &band, settings.slack);
         }
     }
-    annotate(&mut automaton, mdp, settings.episodes, settings.seed);
+    annotate(&mut automaton, space, settings.episodes, settings.seed);
     Ok(automaton)
 }
 
@@ -123,18 +123,19 @@ pub fn compile(
 ///
 /// Without the latter a policy would have nothing to say once anything is a little otherwise than assumed.
 fn meet(
-    mdp: &BeliefMdp,
+    space: &dyn BeliefSpace,
     policy: &dyn Policy,
     settings: &Settings,
 ) -> BTreeMap<(ModeId, Reverse<StratumId>), Met> {
     let disturbed = Disturbed {
         policy,
-        actions: mdp.model().actions.len(),
+        actions: space.model().actions.len(),
         seed: settings.seed,
     };
     let run = |policy: &dyn Policy, episodes| {
-        let length = mdp.model().episode.length;
-        rollout::decisions(mdp, &mdp.filter(), policy, episodes, length, settings.seed).concat()
+        let length = space.model().episode.length;
+        let updater = space.updater();
+        rollout::decisions(space, &updater, policy, episodes, length, settings.seed).concat()
     };
     let mut met: BTreeMap<_, Met> = BTreeMap::new();
     let place = |belief: &Belief| (belief.mode, Reverse(belief.stratum));
@@ -170,14 +171,14 @@ fn meet(
 /// Joins neighbouring levels, from the most certain upwards, as long as the policy at the band's first level, asked at the
 /// beliefs of the next, gives the same actions but for the slack.
 fn bands(
-    mdp: &BeliefMdp,
+    space: &dyn BeliefSpace,
     policy: &dyn Policy,
     met: BTreeMap<(ModeId, Reverse<StratumId>), Met>,
     slack: f64,
 ) -> Vec<Band> {
     let mut bands: Vec<Band> = Vec::new();
     for ((mode, Reverse(level)), Met { decisions, beside }) in met {
-        if mdp.is_over(level) {
+        if space.is_over(level) {
             continue;
         }
         let joins = bands.last().is_some_and(|band| {

@@ -88,12 +88,13 @@ impl Draft {
             mode: self.alias[0],
             ..task.mdp.start().clone()
         };
-        automaton.filter = Filter::with_switches(
+        automaton.updater = Filter::with_switches(
             task.mdp.model(),
             task.mdp.levels(),
             &start,
             self.switches(task),
-        );
+        )
+        .into();
         automaton
     }
 

@@ -112,7 +112,7 @@ impl Planner for Kbvi {
                 let planner = Branches::new(problem.mdp().clone(), search);
                 Found::Rule {
                     policy: Box::new(planner.with_horizon(horizon)),
-                    mdp: problem.mdp().clone(),
+                    space: Box::new(problem.mdp().clone()),
                 }
             }
         };

@@ -176,7 +176,7 @@ impl GridPolicy {
         const EPISODES: usize = 50;
         const SHARE: f64 = 0.01;
         let (filter, length) = (self.mdp.filter(), self.mdp.model().episode.length.min(1000));
-        let met = rollout::decisions(&self.mdp, &filter, self, EPISODES, length, 1).concat();
+        let met = rollout::decisions(&self.mdp, &filter.into(), self, EPISODES, length, 1).concat();
         let axes = self.grid.axes();
         let beyond = |axis: &Axis, x: f64| x < axis.low || x > axis.at(axis.count - 1);
         let beyond = |i: usize| {

@@ -1,0 +1,217 @@
+//! Strata of beliefs that no level graph tells apart: everything about a belief but its mean, as one of finitely many.
+
+use super::StratumId;
+use super::full::Moments;
+use crate::model::{ModeId, Model};
+
+/// Strata that two beliefs lie between are told by their covariance and by how likely modes are. Distances are measured between logarithms
+/// of standard deviations, correlations, and square roots of probabilities.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Codebook {
+    strata: Vec<Stratum>,
+    /// Standard deviations below which beliefs count as certain, length `n`.
+    floors: Vec<f64>,
+}
+
+/// Everything about a belief but its mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stratum {
+    /// Covariance, row by row, `n x n`.
+    pub covariance: Vec<f64>,
+    /// Probability of each mode; they sum to 1.
+    pub weights: Vec<f64>,
+    /// Where it is among strata.
+    code: Vec<f64>,
+}
+
+/// How far apart beliefs of certain and of even modes are, in the units of logarithms of standard deviations.
+const MODES: f64 = 2.0;
+
+/// A belief that is so many times narrower than the start, or than the bounds, is certain.
+const CERTAIN: f64 = 1e-3;
+
+/// A belief lies between so many strata.
+pub const BETWEEN: usize = 4;
+
+impl Stratum {
+    /// The mode that is most likely, the first of several.
+    pub fn mode(&self) -> ModeId {
+        let heavier = |best: usize, mode: usize| match self.weights[mode] > self.weights[best] {
+            true => mode,
+            false => best,
+        };
+        (0..self.weights.len()).fold(0, heavier)
+    }
+
+    /// How uncertain it is: the sum of logarithms of standard deviations.
+    fn spread(&self) -> f64 {
+        let n = (self.covariance.len() as f64).sqrt() as usize;
+        self.code[..n].iter().sum()
+    }
+}
+
+impl Codebook {
+    /// A codebook for a model of strata to be added.
+    pub fn new(model: &Model) -> Self {
+        let floor = |i: usize| {
+            let starts = model.start.iter();
+            let widest = starts.map(|start| start.covariance[(i, i)].max(0.0).sqrt());
+            let width = model.state[i].bounds.width();
+            let width = if width.is_finite() { 0.1 * width } else { 0.0 };
+            CERTAIN * widest.fold(width, f64::max).max(f64::MIN_POSITIVE)
+        };
+        Self {
+            strata: Vec::new(),
+            floors: (0..model.state_dim()).map(floor).collect(),
+        }
+    }
+
+    /// The codebook of given strata, in this order.
+    pub fn of(floors: Vec<f64>, strata: impl IntoIterator<Item = (Vec<f64>, Vec<f64>)>) -> Self {
+        let mut codebook = Self {
+            strata: Vec::new(),
+            floors,
+        };
+        for (covariance, weights) in strata {
+            codebook.add(&Moments {
+                mean: Vec::new(),
+                covariance,
+                weights,
+            });
+        }
+        codebook
+    }
+
+    /// Number of strata.
+    pub fn len(&self) -> usize {
+        self.strata.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.strata.is_empty()
+    }
+
+    /// A stratum.
+    pub fn stratum(&self, stratum: StratumId) -> &Stratum {
+        &self.strata[stratum]
+    }
+
+    /// Standard deviations below which beliefs count as certain, length `n`.
+    pub fn floors(&self) -> &[f64] {
+        &self.floors
+    }
+
+    /// Adds the stratum of a belief.
+    pub fn add(&mut self, moments: &Moments) {
+        let mut code = Vec::new();
+        self.write_code(moments, &mut code);
+        self.strata.push(Stratum {
+            covariance: moments.covariance.clone(),
+            weights: moments.weights.clone(),
+            code,
+        });
+    }
+
+    /// Adds strata of beliefs, the one that is farthest from all strata so far first, until all are nearer than `apart` or there are
+    /// `most`.
+    pub fn cover(&mut self, met: &[Moments], apart: f64, most: usize) {
+        let mut codes = vec![Vec::new(); met.len()];
+        for (moments, code) in met.iter().zip(&mut codes) {
+            self.write_code(moments, code);
+        }
+        let nearest = |code: &Vec<f64>| {
+            let strata = self.strata.iter();
+            strata
+                .map(|stratum| distance(code, &stratum.code))
+                .fold(f64::INFINITY, f64::min)
+        };
+        let mut gaps: Vec<f64> = codes.iter().map(nearest).collect();
+        while self.strata.len() < most {
+            let farthest =
+                (0..met.len()).max_by(|&a, &b| gaps[a].total_cmp(&gaps[b]).then(b.cmp(&a)));
+            let Some(farthest) = farthest.filter(|&i| gaps[i] > apart) else {
+                break;
+            };
+            let chosen = codes[farthest].clone();
+            for (gap, code) in gaps.iter_mut().zip(&codes) {
+                *gap = gap.min(distance(code, &chosen));
+            }
+            self.add(&met[farthest]);
+        }
+    }
+
+    /// Orders strata by their most likely mode, and from wide to narrow within it, as uncertainty levels are.
+    pub fn sort(&mut self) {
+        self.strata.sort_by(|a, b| {
+            let spread = b.spread().total_cmp(&a.spread());
+            a.mode().cmp(&b.mode()).then(spread)
+        });
+    }
+
+    /// The stratum that is nearest to a belief; `code` is room.
+    pub fn nearest(&self, moments: &Moments, code: &mut Vec<f64>) -> StratumId {
+        self.write_code(moments, code);
+        let mut best = (0, f64::INFINITY);
+        for (id, stratum) in self.strata.iter().enumerate() {
+            let apart = distance(code, &stratum.code);
+            if apart < best.1 {
+                best = (id, apart);
+            }
+        }
+        best.0
+    }
+
+    /// The strata that a belief lies between, at most [`BETWEEN`], with weights that sum to 1: the inverse of their distances.
+    pub fn between(&self, moments: &Moments, code: &mut Vec<f64>) -> Vec<(StratumId, f64)> {
+        self.write_code(moments, code);
+        let mut near: Vec<(StratumId, f64)> = Vec::with_capacity(BETWEEN + 1);
+        for (id, stratum) in self.strata.iter().enumerate() {
+            let apart = distance(code, &stratum.code);
+            let place = near.partition_point(|(_, known)| *known <= apart);
+            if place < BETWEEN {
+                near.insert(place, (id, apart));
+                near.truncate(BETWEEN);
+            }
+        }
+        // A hair, so that a stratum met exactly is not infinitely heavy.
+        const HAIR: f64 = 1e-3;
+        // What is far farther than the nearest has nothing to say.
+        const FAR: f64 = 3.0;
+        let reach = near.first().map_or(0.0, |(_, apart)| FAR * (apart + HAIR));
+        near.retain(|(_, apart)| *apart <= reach);
+        let total: f64 = near.iter().map(|(_, apart)| 1.0 / (apart + HAIR)).sum();
+        for (_, weight) in &mut near {
+            *weight = 1.0 / (*weight + HAIR) / total;
+        }
+        near
+    }
+
+    fn write_code(&self, moments: &Moments, code: &mut Vec<f64>) {
+        let n = self.floors.len();
+        let variance = |i: usize| moments.covariance[i * n + i].max(0.0) + self.floors[i].powi(2);
+        code.clear();
+        code.extend((0..n).map(|i| 0.5 * variance(i).ln()));
+        for i in 0..n {
+            for j in 0..i {
+                code.push(moments.covariance[i * n + j] / (variance(i) * variance(j)).sqrt());
+            }
+        }
+        if moments.weights.len() > 1 {
+            code.extend(
+                moments
+                    .weights
+                    .iter()
+                    .map(|weight| MODES * weight.max(0.0).sqrt()),
+            );
+        }
+    }
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b) * (a - b))
+        .sum::<f64>()
+        .sqrt()
+}

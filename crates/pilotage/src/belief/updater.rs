@@ -1,0 +1,283 @@
+//! What keeps the belief of an agent, whatever kind it is: the Kalman filter on its levels, or a belief in full that is read by a codebook.
+
+use std::sync::Arc;
+
+use super::codebook::Codebook;
+use super::full::{Keeping, Moments};
+use super::{Belief, BeliefSpace, CellsKeeping, Filter, Reading, SumKeeping, Tracker, Tracking};
+use crate::error::Result;
+use crate::model::{ActionId, Model, ModelText, TrackerKind};
+
+/// Keeps beliefs, and reads them as a stratum, a mode and a mean. It does not change: what changes is a [`Held`] belief.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Updater {
+    /// The Kalman filter on uncertainty levels.
+    Linear(Filter),
+    /// A sum of Gaussians.
+    Sum(Coded<SumKeeping>),
+    /// Probabilities of cells.
+    Cells(Coded<CellsKeeping>),
+}
+
+/// A way to keep beliefs in full, with the codebook that they are read by.
+#[derive(Debug)]
+pub struct Coded<K> {
+    keeping: Arc<K>,
+    codebook: Arc<Codebook>,
+    text: ModelText,
+    readings: usize,
+}
+
+/// A belief as it is held from step to step.
+#[derive(Debug, Clone)]
+pub struct Held {
+    kept: Kept,
+    read: Belief,
+}
+
+#[derive(Debug, Clone)]
+enum Kept {
+    Linear { scratch: Vec<f64> },
+    Sum(Running<<SumKeeping as Keeping>::Full>),
+    Cells(Running<<CellsKeeping as Keeping>::Full>),
+}
+
+/// A belief in full in the course of an episode, with room to read it.
+#[derive(Debug, Clone)]
+struct Running<F> {
+    full: F,
+    step: usize,
+    moments: Moments,
+    code: Vec<f64>,
+}
+
+impl<K> Clone for Coded<K> {
+    fn clone(&self) -> Self {
+        Self {
+            keeping: Arc::clone(&self.keeping),
+            codebook: Arc::clone(&self.codebook),
+            text: self.text.clone(),
+            readings: self.readings,
+        }
+    }
+}
+
+impl<K> PartialEq for Coded<K> {
+    fn eq(&self, other: &Self) -> bool {
+        self.text.0 == other.text.0 && self.codebook == other.codebook
+    }
+}
+
+impl<K: Keeping> Coded<K> {
+    /// Beliefs of a model that are kept in full, and read by a codebook, which is not empty.
+    pub fn new(model: &Model, keeping: Arc<K>, codebook: Arc<Codebook>) -> Self {
+        Self {
+            keeping,
+            codebook,
+            text: model.text.clone(),
+            readings: model.observation_dim(),
+        }
+    }
+
+    /// The codebook.
+    pub fn codebook(&self) -> &Codebook {
+        &self.codebook
+    }
+
+    fn start(&self) -> (Running<K::Full>, Belief) {
+        let mut running = Running {
+            full: self.keeping.start(),
+            step: 0,
+            moments: Moments::default(),
+            code: Vec::new(),
+        };
+        let mut read = Belief {
+            stratum: 0,
+            mode: 0,
+            mean: Vec::new(),
+        };
+        self.read(&mut running, &mut read);
+        (running, read)
+    }
+
+    fn update(
+        &self,
+        running: &mut Running<K::Full>,
+        read: &mut Belief,
+        action: ActionId,
+        reading: Reading<'_>,
+    ) {
+        let step = running.step;
+        self.keeping.act(&mut running.full, action, step);
+        self.keeping.sense(&mut running.full, action, step, reading);
+        running.step += 1;
+        self.read(running, read);
+    }
+
+    fn read(&self, running: &mut Running<K::Full>, read: &mut Belief) {
+        self.keeping.moments(&running.full, &mut running.moments);
+        read.stratum = self.codebook.nearest(&running.moments, &mut running.code);
+        read.mode = self.codebook.stratum(read.stratum).mode();
+        read.mean.clone_from(&running.moments.mean);
+    }
+}
+
+impl Updater {
+    /// The same for every start hypothesis of a space that someone may be told, from there on; itself alone where there is one start.
+    pub(crate) fn told(&self, space: &dyn BeliefSpace) -> Vec<Self> {
+        let starts = space.hypotheses();
+        match self {
+            Self::Linear(filter) if !starts.is_empty() => {
+                let from = |start| filter.clone().starting_at(start).into();
+                starts.iter().map(from).collect()
+            }
+            _ => vec![self.clone()],
+        }
+    }
+
+    /// Which kind it is.
+    pub fn kind(&self) -> TrackerKind {
+        match self {
+            Self::Linear(_) => TrackerKind::Linear,
+            Self::Sum(_) => TrackerKind::Sum,
+            Self::Cells(_) => TrackerKind::Cells,
+        }
+    }
+
+    /// The Kalman filter, where it is one.
+    pub fn filter(&self) -> Option<&Filter> {
+        match self {
+            Self::Linear(filter) => Some(filter),
+            Self::Sum(_) | Self::Cells(_) => None,
+        }
+    }
+
+    /// How many numbers a reading has; 0 for a discrete sensor.
+    pub fn readings(&self) -> usize {
+        match self {
+            Self::Linear(filter) => filter.readings(),
+            Self::Sum(coded) => coded.readings,
+            Self::Cells(coded) => coded.readings,
+        }
+    }
+
+    /// The codebook by which beliefs in full are read.
+    pub fn codebook(&self) -> Option<&Codebook> {
+        match self {
+            Self::Linear(_) => None,
+            Self::Sum(coded) => Some(coded.codebook()),
+            Self::Cells(coded) => Some(coded.codebook()),
+        }
+    }
+
+    /// The text of the model by which beliefs in full are kept, if it was read from a text.
+    pub(crate) fn model_text(&self) -> Option<&str> {
+        match self {
+            Self::Linear(_) => None,
+            Self::Sum(coded) => coded.text.0.as_deref(),
+            Self::Cells(coded) => coded.text.0.as_deref(),
+        }
+    }
+
+    /// The updater of that kind for a model, with a codebook that is not empty.
+    ///
+    /// # Errors
+    /// As [`CellsKeeping::new`].
+    pub fn coded(model: &Model, kind: TrackerKind, codebook: Arc<Codebook>) -> Result<Self> {
+        Ok(match kind {
+            TrackerKind::Cells => {
+                let keeping = Arc::new(CellsKeeping::new(model)?);
+                Self::Cells(Coded::new(model, keeping, codebook))
+            }
+            _ => Self::Sum(Coded::new(
+                model,
+                Arc::new(SumKeeping::new(model)),
+                codebook,
+            )),
+        })
+    }
+
+    /// What is believed at the start.
+    pub fn start(&self) -> Held {
+        let (kept, read) = match self {
+            Self::Linear(filter) => {
+                let scratch = vec![0.0; filter.states()];
+                (Kept::Linear { scratch }, filter.initial())
+            }
+            Self::Sum(coded) => {
+                let (running, read) = coded.start();
+                (Kept::Sum(running), read)
+            }
+            Self::Cells(coded) => {
+                let (running, read) = coded.start();
+                (Kept::Cells(running), read)
+            }
+        };
+        Held { kept, read }
+    }
+
+    /// Puts a belief back to the start.
+    pub fn reset(&self, held: &mut Held) {
+        match (self, &mut held.kept) {
+            (Self::Linear(filter), Kept::Linear { .. }) => filter.reset(&mut held.read),
+            _ => *held = self.start(),
+        }
+    }
+
+    /// Takes in an action and what was sensed after it. A belief that another kind of updater holds stays as it is.
+    pub fn update(&self, held: &mut Held, action: ActionId, reading: Reading<'_>) {
+        let read = &mut held.read;
+        match (self, &mut held.kept) {
+            (Self::Linear(filter), Kept::Linear { scratch }) => {
+                filter.update(read, action, reading, scratch);
+            }
+            (Self::Sum(coded), Kept::Sum(running)) => coded.update(running, read, action, reading),
+            (Self::Cells(coded), Kept::Cells(running)) => {
+                coded.update(running, read, action, reading);
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Held {
+    /// As a policy reads it.
+    pub fn belief(&self) -> &Belief {
+        &self.read
+    }
+}
+
+/// The belief that an [`Updater`] keeps.
+struct Tracked<'a> {
+    updater: &'a Updater,
+    held: Held,
+}
+
+impl Tracker for Tracked<'_> {
+    fn reset(&mut self) {
+        self.updater.reset(&mut self.held);
+    }
+
+    fn update(&mut self, action: ActionId, reading: Reading<'_>) {
+        self.updater.update(&mut self.held, action, reading);
+    }
+
+    fn belief(&self) -> &Belief {
+        self.held.belief()
+    }
+}
+
+impl Tracking for Updater {
+    fn tracker(&self) -> Box<dyn Tracker + '_> {
+        Box::new(Tracked {
+            updater: self,
+            held: self.start(),
+        })
+    }
+}
+
+impl From<Filter> for Updater {
+    fn from(filter: Filter) -> Self {
+        Self::Linear(filter)
+    }
+}

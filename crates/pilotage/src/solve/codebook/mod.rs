@@ -1,0 +1,250 @@
+//! Value iteration on a codebook: beliefs of any kind, planned for by stratum and mean.
+//!
+//! Beliefs are kept in full, by whatever [`Keeping`] a model takes, and read as a mean and one of finitely many strata
+//! ([`Codebook`]). Values stand on a grid of means for every stratum.
+//!
+//! 1. Beliefs are met by acting at random, and strata chosen among them so that all are near one.
+//! 2. From every stratum and mean of the grid every action leads to the beliefs after evenly spread readings, which are read as the strata
+//!    that they lie between and the points of the grid around their mean. Where beliefs in full were met, they take the place of what
+//!    the codebook makes of them.
+//! 3. Value iteration on these sparse rows.
+//! 4. The greedy policy is run, with some actions at random; the beliefs it meets go back to 1.
+//!
+//! The round that earns most in the world that the model assumes is kept.
+
+mod grid_values;
+mod meet;
+mod rows;
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::refusals;
+use super::settings::{Settings, ensure};
+use super::solver::{Found, Plan, Planner, Problem, refuse_if};
+use crate::belief::{
+    CellsKeeping, Codebook, Coded, CodedSpace, Keeping, Moments, SumKeeping, Updater,
+};
+use crate::error::Result;
+use crate::model::{Model, TrackerKind};
+use crate::progress::Progress;
+use crate::scenario::Scenario;
+use crate::simulate::{Options, evaluate};
+pub use grid_values::GridValues;
+use meet::{Met, meet};
+use rows::Rows;
+
+/// Name of the solver in errors and policies.
+const SOLVER: &str = "codebook";
+
+/// The planner on a codebook of strata.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CodebookPlanner {
+    /// Most strata; 1 to 1000.
+    pub strata: usize,
+    /// How far apart strata are at least, in units of the logarithm of a standard deviation; above 0.
+    pub apart: f64,
+    /// Points of the grid of means along each variable; at least 2, or `auto` for what suits the number of variables.
+    pub points: Option<usize>,
+    /// Readings that are thought of after an action; at least 1.
+    pub readings: usize,
+    /// Times that the plan is refined on the beliefs that it meets; at least 1.
+    pub rounds: usize,
+    /// Episodes that are run to meet beliefs in a round; 1 to a million.
+    pub episodes: usize,
+    /// Most beliefs in full that a round refines on.
+    pub refined: usize,
+    /// Largest change of a value in the last sweep, as a share of the largest value; above 0.
+    pub tolerance: f64,
+}
+
+impl Default for CodebookPlanner {
+    fn default() -> Self {
+        Self {
+            strata: 40,
+            apart: 0.2,
+            points: None,
+            readings: 40,
+            rounds: 3,
+            episodes: 400,
+            refined: 3000,
+            tolerance: 1e-6,
+        }
+    }
+}
+
+impl Settings for CodebookPlanner {
+    fn validate(&self) -> Result<()> {
+        ensure(
+            "strata",
+            self.strata,
+            (1..=1000).contains(&self.strata),
+            "1 to 1000",
+        )?;
+        ensure("apart", self.apart, self.apart > 0.0, "above 0")?;
+        let points = self.points.unwrap_or(2);
+        ensure("points", points, points >= 2, "at least 2")?;
+        ensure("readings", self.readings, self.readings >= 1, "at least 1")?;
+        ensure("rounds", self.rounds, self.rounds >= 1, "at least 1")?;
+        super::rollout::check_runs("episodes", self.episodes)?;
+        ensure("tolerance", self.tolerance, self.tolerance > 0.0, "above 0")
+    }
+}
+
+/// Whether a model is planned for on a codebook: its beliefs are kept in full.
+///
+/// # Errors
+/// [`crate::Error::Unsupported`] with the reason, and what would do.
+pub fn accepts(model: &Model) -> Result<()> {
+    let exact = || {
+        (model.tracker() == TrackerKind::Linear).then(|| {
+            "one Gaussian on uncertainty levels is its belief; use value-iteration, or write `tracker = \"sum\"` in [belief]".to_owned()
+        })
+    };
+    let reason = refusals::reward_missing(model)
+        .or_else(exact)
+        .or_else(|| refusals::changes(model));
+    refuse_if(SOLVER, model, reason)
+}
+
+impl Planner for CodebookPlanner {
+    fn name(&self) -> &'static str {
+        SOLVER
+    }
+
+    fn accepts(&self, model: &Model) -> Result<()> {
+        accepts(model)
+    }
+
+    fn needs_levels(&self) -> bool {
+        false
+    }
+
+    fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
+        let model = problem.model();
+        match model.tracker() {
+            TrackerKind::Cells => {
+                let keeping = Arc::new(CellsKeeping::new(model)?);
+                self.plan_with(model, keeping, Updater::Cells, problem.seed(), observer)
+            }
+            _ => {
+                let keeping = Arc::new(SumKeeping::new(model));
+                self.plan_with(model, keeping, Updater::Sum, problem.seed(), observer)
+            }
+        }
+    }
+}
+
+/// What a round of planning found.
+struct Round {
+    values: GridValues,
+    updater: Updater,
+    codebook: Arc<Codebook>,
+    planned: f64,
+    earned: f64,
+}
+
+impl CodebookPlanner {
+    fn plan_with<K: Keeping>(
+        &self,
+        model: &Model,
+        keeping: Arc<K>,
+        updater: fn(Coded<K>) -> Updater,
+        seed: u64,
+        observer: &dyn Progress,
+    ) -> Result<Plan> {
+        let mut codebook = Codebook::new(model);
+        let mut met = meet(model, keeping.as_ref(), None, self.episodes, seed);
+        let mut best: Option<Round> = None;
+        for round in 0..self.rounds {
+            observer.progress("rounds", round as u64, self.rounds as u64);
+            let moments: Vec<Moments> = met.iter().map(|met| met.moments.clone()).collect();
+            codebook.cover(&moments, self.apart, self.strata);
+            let grid = self.grid(model, &moments);
+            let rows = Rows::new(keeping.as_ref(), &codebook, grid, &met, self);
+            let found = rows.solve(model.discount, self.tolerance);
+            let planned = rows.worth(keeping.as_ref(), &codebook, &found, model.discount, self);
+            let values = GridValues::new(rows.grid, found, codebook.len(), model.actions.len());
+            let shared = Arc::new(codebook.clone());
+            let updater = updater(Coded::new(model, Arc::clone(&keeping), Arc::clone(&shared)));
+            let options = Options {
+                episodes: TRIALS,
+                seed: seed.wrapping_add(1),
+            };
+            let assumed = Scenario::assumed(model);
+            let earned = evaluate(
+                &assumed,
+                &updater,
+                &values,
+                options,
+                &crate::progress::Silent,
+            );
+            let earned = earned.discounted.mean;
+            met = meet(
+                model,
+                keeping.as_ref(),
+                Some((&values, &codebook)),
+                self.episodes,
+                seed.wrapping_add(2 + round as u64),
+            );
+            if best.as_ref().is_none_or(|best| earned > best.earned) {
+                best = Some(Round {
+                    values,
+                    updater,
+                    codebook: shared,
+                    planned,
+                    earned,
+                });
+            }
+        }
+        observer.progress("rounds", self.rounds as u64, self.rounds as u64);
+        let Some(best) = best else {
+            return Err(crate::Error::Setting {
+                setting: "rounds",
+                value: self.rounds.to_string(),
+                range: "at least 1",
+            });
+        };
+        let space = CodedSpace::new(model, best.updater, &best.codebook);
+        Ok(Plan {
+            value: Some(best.planned),
+            ..Plan::of(Found::Rule {
+                policy: Box::new(best.values),
+                space: Box::new(space),
+            })
+        })
+    }
+
+    /// Points of means that cover those that were met.
+    fn grid(&self, model: &Model, met: &[Moments]) -> super::grid::Grid {
+        let n = model.state_dim();
+        let points = self.points.unwrap_or(match n {
+            1 => 161,
+            2 => 33,
+            3 => 15,
+            _ => 9,
+        });
+        let axis = |i: usize| {
+            let means = met.iter().map(|moments| moments.mean[i]);
+            let (low, high) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                (low.min(x), high.max(x))
+            });
+            let margin = 0.05 * (high - low).max(1e-9);
+            let bounds = model.state[i].bounds;
+            let (low, high) = (
+                (low - margin).max(bounds.low),
+                (high + margin).min(bounds.high),
+            );
+            super::grid::Axis::new(low, high.max(low + 1e-9), points)
+        };
+        super::grid::Grid::new(
+            (0..n).map(axis).collect(),
+            super::grid::Interpolation::Linear,
+        )
+    }
+}
+
+/// Episodes by which the rounds are compared.
+const TRIALS: usize = 2000;

@@ -1,0 +1,251 @@
+//! The decision process on strata and a grid of means, as sparse rows.
+
+use std::collections::BTreeMap;
+
+use super::CodebookPlanner;
+use super::meet::Met;
+use crate::belief::{Codebook, Keeping, Moments};
+use crate::parallel;
+use crate::solve::grid::Grid;
+
+/// What an action is expected to do at a state: a stratum and a point of the grid.
+#[derive(Debug, Clone, Default)]
+struct Row {
+    reward: f64,
+    restarted: f64,
+    next: Vec<(u32, f64)>,
+}
+
+/// All rows, by state and action.
+pub(super) struct Rows {
+    pub grid: Grid,
+    rows: Vec<Row>,
+    actions: usize,
+    /// Where an episode starts: states with weights.
+    start: Vec<(u32, f64)>,
+}
+
+/// Most beliefs in full that one state is refined on.
+const SHARED: usize = 4;
+
+/// Most sweeps of value iteration.
+const SWEEPS: usize = 5000;
+
+/// Reads beliefs as states.
+struct Reader<'a> {
+    codebook: &'a Codebook,
+    grid: &'a Grid,
+}
+
+impl Reader<'_> {
+    /// The states that a belief lies between, with weights that sum to 1.
+    fn states(&self, moments: &Moments, code: &mut Vec<f64>, to: &mut Vec<(u32, f64)>, share: f64) {
+        let points = self.grid.len();
+        let around = self.grid.around(&moments.mean);
+        for (stratum, weight) in self.codebook.between(moments, code) {
+            for (point, part) in &around {
+                to.push(((stratum * points + point) as u32, share * weight * part));
+            }
+        }
+    }
+
+    /// What an action leads to.
+    fn row<K: Keeping>(&self, keeping: &K, full: &K::Full, action: usize, readings: usize) -> Row {
+        let mut moved = full.clone();
+        let acted = keeping.act(&mut moved, action, 0);
+        let goes_on = 1.0 - acted.ended - acted.restarted;
+        let mut next = Vec::new();
+        if goes_on > 1e-12 {
+            let (mut moments, mut code) = (Moments::default(), Vec::new());
+            for (likely, sensed) in keeping.readings(&moved, action, 0, readings) {
+                if likely <= 0.0 {
+                    continue;
+                }
+                let mut after = moved.clone();
+                keeping.sense(&mut after, action, 0, sensed.reading());
+                keeping.moments(&after, &mut moments);
+                self.states(&moments, &mut code, &mut next, goes_on * likely);
+            }
+        }
+        Row {
+            reward: acted.reward,
+            restarted: acted.restarted,
+            next: merged(next),
+        }
+    }
+}
+
+/// Entries of one state added up, those that do not count left out.
+fn merged(mut entries: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
+    const NOTHING: f64 = 1e-9;
+    entries.sort_by_key(|(state, _)| *state);
+    entries.dedup_by(|(state, weight), (kept, sum)| {
+        let same = state == kept;
+        if same {
+            *sum += *weight;
+        }
+        same
+    });
+    entries.retain(|(_, weight)| *weight > NOTHING);
+    entries.shrink_to_fit();
+    entries
+}
+
+/// The average of rows.
+fn averaged(rows: &[Row]) -> Row {
+    let share = 1.0 / rows.len() as f64;
+    let next = rows.iter().flat_map(|row| row.next.iter());
+    Row {
+        reward: share * rows.iter().map(|row| row.reward).sum::<f64>(),
+        restarted: share * rows.iter().map(|row| row.restarted).sum::<f64>(),
+        next: merged(
+            next.map(|&(state, weight)| (state, share * weight))
+                .collect(),
+        ),
+    }
+}
+
+impl Rows {
+    /// The rows of a codebook, refined on beliefs that were met.
+    pub(super) fn new<K: Keeping>(
+        keeping: &K,
+        codebook: &Codebook,
+        grid: Grid,
+        met: &[Met<K::Full>],
+        settings: &CodebookPlanner,
+    ) -> Self {
+        let reader = Reader {
+            codebook,
+            grid: &grid,
+        };
+        let actions = keeping.actions();
+        let (points, states) = (grid.len(), codebook.len() * grid.len());
+        let refined = refined::<K>(&reader, met, settings.refined);
+        let of_state = |state: usize| -> Vec<Row> {
+            let mean = grid.point(state % points);
+            let fulls: Vec<K::Full> = match refined.get(&state) {
+                Some(fulls) => fulls
+                    .iter()
+                    .map(|&i| keeping.moved_to(&met[i].full, &mean))
+                    .collect(),
+                None => {
+                    let stratum = codebook.stratum(state / points);
+                    vec![keeping.with_moments(&Moments {
+                        mean,
+                        covariance: stratum.covariance.clone(),
+                        weights: stratum.weights.clone(),
+                    })]
+                }
+            };
+            let of_action = |action: usize| {
+                let of = |full: &K::Full| reader.row(keeping, full, action, settings.readings);
+                match fulls.as_slice() {
+                    [full] => of(full),
+                    fulls => averaged(&fulls.iter().map(of).collect::<Vec<_>>()),
+                }
+            };
+            (0..actions).map(of_action).collect()
+        };
+        let rows = parallel::map(states, of_state);
+        let mut moments = Moments::default();
+        keeping.moments(&keeping.start(), &mut moments);
+        let mut start = Vec::new();
+        reader.states(&moments, &mut Vec::new(), &mut start, 1.0);
+        Self {
+            rows: rows.into_iter().flatten().collect(),
+            actions,
+            start: merged(start),
+            grid,
+        }
+    }
+
+    /// Values of all actions in all states.
+    pub(super) fn solve(&self, discount: f64, tolerance: f64) -> Vec<f64> {
+        let states = self.rows.len() / self.actions;
+        let mut values = vec![0.0; states];
+        for _ in 0..SWEEPS {
+            let (mut change, mut largest) = (0.0_f64, 0.0_f64);
+            for state in 0..states {
+                let best = (0..self.actions)
+                    .map(|action| self.value(&values, state, action, discount))
+                    .fold(f64::NEG_INFINITY, f64::max);
+                change = change.max((best - values[state]).abs());
+                largest = largest.max(best.abs());
+                values[state] = best;
+            }
+            if change <= tolerance * largest {
+                break;
+            }
+        }
+        let all =
+            (0..states).flat_map(|state| (0..self.actions).map(move |action| (state, action)));
+        all.map(|(state, action)| self.value(&values, state, action, discount))
+            .collect()
+    }
+
+    fn value(&self, values: &[f64], state: usize, action: usize, discount: f64) -> f64 {
+        self.worth_of(&self.rows[state * self.actions + action], values, discount)
+    }
+
+    fn worth_of(&self, row: &Row, values: &[f64], discount: f64) -> f64 {
+        let sum = |entries: &[(u32, f64)]| -> f64 {
+            let entries = entries.iter();
+            entries
+                .map(|(state, weight)| weight * values[*state as usize])
+                .sum()
+        };
+        let afresh = match row.restarted > 0.0 {
+            true => row.restarted * sum(&self.start),
+            false => 0.0,
+        };
+        row.reward + discount * (sum(&row.next) + afresh)
+    }
+
+    /// What the best action is worth at the start itself.
+    pub(super) fn worth<K: Keeping>(
+        &self,
+        keeping: &K,
+        codebook: &Codebook,
+        found: &[f64],
+        discount: f64,
+        settings: &CodebookPlanner,
+    ) -> f64 {
+        let reader = Reader {
+            codebook,
+            grid: &self.grid,
+        };
+        let best = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let values: Vec<f64> = found.chunks(self.actions).map(best).collect();
+        let start = keeping.start();
+        let of = |action| {
+            let row = reader.row(keeping, &start, action, FINE * settings.readings);
+            self.worth_of(&row, &values, discount)
+        };
+        (0..self.actions).map(of).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// So many times as many readings are thought of at the start.
+const FINE: usize = 10;
+
+/// Of the beliefs that were met, those that take the place of a state.
+fn refined<K: Keeping>(
+    reader: &Reader<'_>,
+    met: &[Met<K::Full>],
+    most: usize,
+) -> BTreeMap<usize, Vec<usize>> {
+    let stride = met.len().div_ceil(most.max(1)).max(1);
+    let mut refined: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    let mut code = Vec::new();
+    for (i, met) in met.iter().enumerate().step_by(stride) {
+        let stratum = reader.codebook.nearest(&met.moments, &mut code);
+        let point = reader.grid.nearest(&met.moments.mean);
+        let fulls = refined
+            .entry(stratum * reader.grid.len() + point)
+            .or_default();
+        if fulls.len() < SHARED {
+            fulls.push(i);
+        }
+    }
+    refined
+}
