@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use pilotage::Error;
 use pilotage::belief::BeliefMdp;
+use pilotage::model::{Model, TrackerKind};
 use pilotage::policy;
 use pilotage::scenario;
 use pilotage::solve::Registry;
@@ -41,18 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let model = scenario::find(file)?.model;
     let registry = Registry::builtin();
-    let mdp = BeliefMdp::new(&model);
-    let levels = mdp.levels();
-    levels.check(&model)?;
-    let sd = |level: usize| -> Vec<f64> {
-        levels
-            .covariance(level)
-            .diagonal()
-            .iter()
-            .map(|variance| variance.sqrt())
-            .collect()
-    };
-    let steady = levels.steady(levels.starts()[0], levels.class_of(0));
+    let levels = Levels::of(&model)?;
     if arguments.json {
         let report = json!({
             "pilotage": env!("CARGO_PKG_VERSION"),
@@ -61,16 +51,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "actions": model.actions.iter().map(|action| &action.name).collect::<Vec<_>>(),
             "modes": model.modes,
             "discount": model.discount,
-            "levels": levels.len(),
-            "start_deviation": sd(levels.starts()[0]),
-            "steady_deviation": steady.map(sd),
+            "tracker": model.tracker(),
+            "levels": levels.as_ref().map(|levels| levels.count),
+            "start_deviation": levels.as_ref().map(|levels| &levels.start),
+            "steady_deviation": levels.as_ref().and_then(|levels| levels.steady.as_ref()),
             "solvers": registry.entries().iter().filter(|solver| solver.accepts(&model).is_ok()).map(|solver| solver.name()).collect::<Vec<_>>(),
         });
         writeln!(out, "{report}")?;
         return Ok(());
     }
     let names = |names: Vec<&str>| names.join(", ");
-    let deviations = |values: Vec<f64>| {
+    let deviations = |values: &[f64]| {
         values
             .iter()
             .map(|value| format!("{value:.4}"))
@@ -126,23 +117,22 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             model.clock()
         )?;
     }
-    let cut = if levels.converged() {
-        ""
-    } else {
-        " (cut at the limit)"
-    };
-    writeln!(out, "  levels    {}{cut}", levels.len())?;
-    writeln!(
-        out,
-        "  deviation {} at the start",
-        deviations(sd(levels.starts()[0]))
-    )?;
-    if let Some(steady) = steady {
-        writeln!(
-            out,
-            "            {} in the steady state",
-            deviations(sd(steady))
-        )?;
+    writeln!(out, "  belief    {}", belief(&model))?;
+    if let Some(levels) = levels {
+        let cut = match levels.converged {
+            true => "",
+            false => " (cut at the limit)",
+        };
+        writeln!(out, "  levels    {}{cut}", levels.count)?;
+        let start = deviations(&levels.start);
+        writeln!(out, "  deviation {start} at the start")?;
+        if let Some(steady) = levels.steady {
+            writeln!(
+                out,
+                "            {} in the steady state",
+                deviations(&steady)
+            )?;
+        }
     }
     for solver in registry.entries() {
         match solver.accepts(&model) {
@@ -154,4 +144,57 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// Uncertainty levels, and standard deviations at them.
+struct Levels {
+    count: usize,
+    converged: bool,
+    start: Vec<f64>,
+    steady: Option<Vec<f64>>,
+}
+
+impl Levels {
+    /// Those of a linear model.
+    fn of(model: &Model) -> Result<Option<Self>, Error> {
+        if !model.is_linear() {
+            return Ok(None);
+        }
+        let mdp = BeliefMdp::new(model);
+        let levels = mdp.levels();
+        levels.check(model)?;
+        let deviations = |level: usize| -> Vec<f64> {
+            let covariance = levels.covariance(level);
+            let variances = covariance.diagonal();
+            variances.iter().map(|variance| variance.sqrt()).collect()
+        };
+        let start = levels.starts()[0];
+        let steady = levels.steady(start, levels.class_of(0));
+        Ok(Some(Self {
+            count: levels.len(),
+            converged: levels.converged(),
+            start: deviations(start),
+            steady: steady.map(deviations),
+        }))
+    }
+}
+
+/// What keeps the belief of a model, and why.
+fn belief(model: &Model) -> String {
+    let chosen = match model.belief.tracker {
+        TrackerKind::Auto => {
+            let reasons = model.beyond_levels();
+            match reasons.is_empty() {
+                true => "nothing about state and mode is lost by it".to_owned(),
+                false => format!("because of {}", reasons.join(", ")),
+            }
+        }
+        _ => "as [belief] says".to_owned(),
+    };
+    let kind = match model.tracker() {
+        TrackerKind::Cells => "probabilities of cells",
+        TrackerKind::Sum => "a sum of weighted Gaussians",
+        TrackerKind::Linear | TrackerKind::Auto => "one Gaussian on uncertainty levels",
+    };
+    format!("{kind}, {chosen}")
 }

@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use pilotage::belief::BeliefMdp;
 use pilotage::policy::write_whole;
 use pilotage_report::{automaton_svg, belief_map_svg};
 
@@ -26,13 +25,15 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (automaton, scenario) =
         policy_and_problem(&arguments.policy, arguments.problem.as_deref())?;
-    let mdp = BeliefMdp::new(&scenario.model);
-    mdp.levels().check(&scenario.model)?;
+    let space = automaton.space(&scenario.model);
+    if let Some(mdp) = space.as_mdp() {
+        mdp.check()?;
+    }
     let pictures = [
         ("automaton.svg", automaton_svg(&automaton)?),
         (
             "map.svg",
-            belief_map_svg(&mdp, &automaton, Some(&automaton))?,
+            belief_map_svg(space.as_ref(), &automaton, Some(&automaton))?,
         ),
     ];
     let mut out = std::io::stdout().lock();

@@ -1,7 +1,7 @@
 //! Episodes written down step by step, to be played: the very runs that a simulation makes with the same seed.
 
 use super::finding::{Frame, Hypothesis, Recording};
-use pilotage::belief::{Belief, BeliefMdp};
+use pilotage::belief::{Belief, BeliefSpace};
 use pilotage::error::{Error, Result};
 use pilotage::model::{Interval, ModeId, Model, Region};
 use pilotage::policy::{Automaton, AutomatonRunner};
@@ -26,16 +26,16 @@ pub struct Take {
 /// # Errors
 /// [`Error::Unsupported`] for models with more than two state variables.
 pub fn record(
-    mdp: &BeliefMdp,
+    space: &dyn BeliefSpace,
     truth: &Truth,
     automaton: &Automaton,
     take: Take,
 ) -> Result<Recording> {
     let mut scenario = Scenario {
-        model: mdp.model().clone(),
+        model: space.model().clone(),
         truth: truth.clone(),
     };
-    let model = mdp.model();
+    let model = space.model();
     if model.state_dim() > 2 {
         return Err(Error::Unsupported {
             solver: "recording an episode",
@@ -47,16 +47,17 @@ pub fn record(
         });
     }
     let controller = AutomatonRunner::new(automaton);
-    let frames = if mdp.starts().len() > 1 {
+    let several = space.as_mdp().filter(|mdp| mdp.starts().len() > 1);
+    let frames = if let Some(mdp) = several {
         scenario.truth.start = None;
         let wake_up::Settings {
             tracking, choice, ..
         } = wake_up::Settings::default();
         let mut agent = wake_up::WakeUpAgent::new(mdp, &controller, tracking, choice)?;
-        run(mdp, &scenario, automaton, &mut agent, take)
+        run(space, &scenario, automaton, &mut agent, take)
     } else {
         let mut agent = TrackingAgent::new(&automaton.updater, &controller);
-        run(mdp, &scenario, automaton, &mut agent, take)
+        run(space, &scenario, automaton, &mut agent, take)
     };
     let bounds = bounds(model, &frames);
     let corners = |region: &Region| corners(region, &bounds);
@@ -88,7 +89,7 @@ pub fn record(
 
 /// The frames of an episode: each the state and belief before a step, with what was done there and what it paid.
 fn run(
-    mdp: &BeliefMdp,
+    space: &dyn BeliefSpace,
     scenario: &Scenario,
     automaton: &Automaton,
     agent: &mut dyn Agent,
@@ -100,7 +101,7 @@ fn run(
     world.reset(&mut Streams::new(take.seed, take.episode));
     agent.reset();
     let before = |state: &[f64], mode: ModeId, agent: &dyn Agent| {
-        let (valid, hypotheses) = believed(mdp, agent);
+        let (valid, hypotheses) = believed(space, agent);
         Frame {
             state: state.to_vec(),
             mode: mode_name(model, mode),
@@ -133,17 +134,17 @@ fn run(
 }
 
 /// The hypotheses, the likeliest first, and which of them the agent acts on.
-fn believed(mdp: &BeliefMdp, agent: &dyn Agent) -> (usize, Vec<Hypothesis>) {
+fn believed(space: &dyn BeliefSpace, agent: &dyn Agent) -> (usize, Vec<Hypothesis>) {
     let mut hypotheses = agent.hypotheses();
     hypotheses.sort_by(|a, b| b.0.total_cmp(&a.0));
     let acted_on = |&(_, belief): &(f64, &Belief)| std::ptr::eq(belief, agent.belief());
     let valid = hypotheses.iter().position(acted_on).unwrap_or(0);
     let drawn = hypotheses.into_iter().map(|(weight, belief)| Hypothesis {
         weight,
-        mode: mode_name(mdp.model(), belief.mode),
+        mode: mode_name(space.model(), belief.mode),
         mean: belief.mean.clone(),
         // A covariance is the same row by row and column by column.
-        covariance: mdp.covariance(belief.stratum).as_slice().to_vec(),
+        covariance: space.covariance(belief.stratum).as_slice().to_vec(),
     });
     (valid, drawn.collect())
 }

@@ -6,7 +6,7 @@ mod common;
 use common::{built_in, scenario};
 use pilotage::model::{
     Event, Fingerprint, HypothesisBelief, Interval, Model, QuadraticCost, Region, StartShape,
-    StateVariable, Steps, Then, WallBelief, When,
+    StateVariable, Steps, Then, VariableKind, WallBelief, When,
 };
 use pilotage::scenario::{self, Scenario, Simulator, TrueControl, Truth, Walls};
 

@@ -164,7 +164,7 @@ fn in_the_corridor_knowing_the_walls_is_worth_a_quarter_more() {
         let scenario = find(name);
         let mdp = BeliefMdp::new(&scenario.model);
         let policy = automaton(&mdp, &plan(&mdp), 300);
-        evaluate(&scenario, &policy.filter, &policy, options, &Silent).discounted
+        evaluate(&scenario, &policy.updater, &policy, options, &Silent).discounted
     };
     let (knows, plain) = (earned("corridor-walls"), earned("corridor"));
     assert!(
@@ -230,7 +230,7 @@ fn the_hidden_load_is_carried_in_the_shortest_cycle() {
         episodes: 1,
         seed: 1,
     };
-    let earned = evaluate(&scenario, &policy.filter, &policy, options, &Silent);
+    let earned = evaluate(&scenario, &policy.updater, &policy, options, &Silent);
     assert_eq!(
         earned.undiscounted.mean, 20.0,
         "two rewards in every ten of 100 steps"

@@ -64,7 +64,7 @@ pub fn draw(map: &Map<'_>) -> String {
 
 /// Levels from the least to the most certain; with an automaton, those it has nodes at and the start.
 fn shown_levels(map: &Map<'_>) -> Vec<StratumId> {
-    let start = map.mdp.start().stratum;
+    let start = map.space.start().stratum;
     let is_met = |level: StratumId| {
         map.automaton.is_none_or(|automaton| {
             let mut bands = automaton.nodes.iter().map(|node| node.levels);
@@ -77,7 +77,7 @@ fn shown_levels(map: &Map<'_>) -> Vec<StratumId> {
 }
 
 fn what(map: &Map<'_>, shown: &[StratumId]) -> String {
-    let total = map.mdp.strata();
+    let total = map.space.strata();
     let levels = match (shown.len(), total) {
         (_, 1) => "there is one level.".to_owned(),
         (all, total) if all == total => {
@@ -122,7 +122,7 @@ impl Panel<'_> {
     }
 
     fn axis_name(&self) -> String {
-        let name = &self.map.mdp.model().state[0].name;
+        let name = &self.map.space.model().state[0].name;
         match self.map.mode_name(self.mode) {
             "" => format!("mean of {name}"),
             mode => format!("mean of {name}, when {mode}"),
@@ -189,7 +189,7 @@ impl Panel<'_> {
     }
 
     fn bounds(&self) -> Vec<Element> {
-        let bounds = self.map.mdp.model().state[0].bounds;
+        let bounds = self.map.space.model().state[0].bounds;
         let (top, bottom) = self.y.paper;
         let frame = svg::rect(
             (self.x.paper.0, top),
@@ -344,7 +344,7 @@ impl Panel<'_> {
     }
 
     fn start(&self) -> Option<Element> {
-        let start = self.map.mdp.start();
+        let start = self.map.space.start();
         let row = self
             .levels
             .iter()

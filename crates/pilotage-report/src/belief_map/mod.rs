@@ -11,7 +11,7 @@ use super::is_sound;
 use super::palette::Paint;
 use super::plot::figure;
 use super::sheet::{Sheet, Sign};
-use pilotage::belief::{BeliefMdp, StratumId};
+use pilotage::belief::{BeliefSpace, StratumId};
 use pilotage::error::{Error, Result};
 use pilotage::model::{Interval, ModeId, Region};
 use pilotage::policy::{Automaton, Node, Place, Policy};
@@ -29,32 +29,32 @@ const BEYOND: f64 = 0.12;
 /// # Errors
 /// [`Error::Policy`] if the automaton is not one of this problem's state variables and levels.
 pub fn belief_map_svg(
-    mdp: &BeliefMdp,
+    space: &dyn BeliefSpace,
     policy: &dyn Policy,
     automaton: Option<&Automaton>,
 ) -> Result<String> {
     // Places in coordinates of their own have no frames among the state variables.
     let automaton = automaton.filter(|automaton| automaton.coordinates.is_none());
     if let Some(automaton) = automaton {
-        check(mdp, automaton)?;
+        check(space, automaton)?;
     }
     let map = Map {
-        mdp,
+        space,
         policy,
         automaton,
     };
-    if mdp.model().state_dim() == 1 {
+    if space.model().state_dim() == 1 {
         Ok(line::draw(&map))
     } else {
         Ok(plane::draw(&map))
     }
 }
 
-fn check(mdp: &BeliefMdp, automaton: &Automaton) -> Result<()> {
-    let (n, model) = (mdp.model().state_dim(), mdp.model());
+fn check(space: &dyn BeliefSpace, automaton: &Automaton) -> Result<()> {
+    let (n, model) = (space.model().state_dim(), space.model());
     let fits = automaton.nodes.iter().all(|node| {
         is_sound(&node.place, n)
-            && node.levels.1 < mdp.strata()
+            && node.levels.1 < space.strata()
             && node.mode < automaton.modes.len()
             && node.action < model.actions.len()
     });
@@ -72,7 +72,7 @@ fn check(mdp: &BeliefMdp, automaton: &Automaton) -> Result<()> {
 
 /// What is drawn.
 struct Map<'a> {
-    mdp: &'a BeliefMdp,
+    space: &'a dyn BeliefSpace,
     policy: &'a dyn Policy,
     automaton: Option<&'a Automaton>,
 }
@@ -80,7 +80,7 @@ struct Map<'a> {
 impl Map<'_> {
     /// A sheet with the heading.
     fn sheet(&self, what: &str, width: f64) -> Sheet {
-        let model = self.mdp.model();
+        let model = self.space.model();
         let title = format!("Belief map of {}", model.name);
         let description = format!("The best action of {} for every belief: {what}", model.name);
         Sheet::new(&title, what, &description, width)
@@ -88,7 +88,7 @@ impl Map<'_> {
 
     /// The actions and the marks, with what they mean.
     fn legend(&self, more: Vec<(Sign, String)>) -> Vec<(Sign, String)> {
-        let actions = self.mdp.model().actions.iter().enumerate();
+        let actions = self.space.model().actions.iter().enumerate();
         actions
             .map(|(k, action)| (Sign::Tint(Paint::Hue(k)), action.name.clone()))
             .chain(more)
@@ -106,9 +106,9 @@ impl Map<'_> {
 
     /// What is shown of a state variable: its bounds and a little beyond, the start and every place of a node.
     fn extent(&self, variable: usize) -> (f64, f64) {
-        let model = self.mdp.model();
-        let start = self.mdp.start();
-        let deviation = self.mdp.covariance(start.stratum)[(variable, variable)].sqrt();
+        let model = self.space.model();
+        let start = self.space.start();
+        let deviation = self.space.covariance(start.stratum)[(variable, variable)].sqrt();
         let mean = start.mean[variable];
         let Interval { low, high } = model.state[variable].bounds;
         let around = 4.0 * deviation.max(0.25 * mean.abs()).max(1e-3);
@@ -138,29 +138,23 @@ impl Map<'_> {
 
     /// Levels from the least to the most certain.
     fn ordered_levels(&self) -> Vec<StratumId> {
-        let levels = self.mdp.levels();
-        let mut ids: Vec<StratumId> = (0..levels.len()).collect();
-        ids.sort_by(|&a, &b| {
-            levels
-                .covariance(b)
-                .trace()
-                .total_cmp(&levels.covariance(a).trace())
-                .then(a.cmp(&b))
-        });
+        let spread = |level| self.space.covariance(level).trace();
+        let mut ids: Vec<StratumId> = (0..self.space.strata()).collect();
+        ids.sort_by(|&a, &b| spread(b).total_cmp(&spread(a)).then(a.cmp(&b)));
         ids
     }
 
     /// The level that repeats itself, or where there is none the most certain.
     fn steady_level(&self) -> StratumId {
-        let steady = self.mdp.levels().steady(self.mdp.start().stratum, 0);
-        steady
+        self.space
+            .steady()
             .or_else(|| self.ordered_levels().last().copied())
             .unwrap_or(0)
     }
 
     /// Standard deviation of a variable at a level.
     fn deviation(&self, level: StratumId, variable: usize) -> f64 {
-        self.mdp.covariance(level)[(variable, variable)]
+        self.space.covariance(level)[(variable, variable)]
             .max(0.0)
             .sqrt()
     }
@@ -177,7 +171,7 @@ impl Map<'_> {
                 .map(|sd| format!("σ = {sd}"))
                 .unwrap_or_default();
         }
-        let states = &self.mdp.model().state;
+        let states = &self.space.model().state;
         let each = variables
             .iter()
             .zip(&figures)
@@ -188,7 +182,7 @@ impl Map<'_> {
     /// What the policy tells apart: the automaton's modes or memories that have nodes, or else the model's modes.
     fn modes(&self) -> Vec<ModeId> {
         match self.automaton {
-            None => (0..self.mdp.model().modes.len()).collect(),
+            None => (0..self.space.model().modes.len()).collect(),
             Some(automaton) => (0..automaton.modes.len())
                 .filter(|&mode| self.nodes(mode).next().is_some())
                 .collect(),
@@ -197,19 +191,19 @@ impl Map<'_> {
 
     /// Whether they are not the model's modes but memories of its own.
     fn remembers(&self) -> bool {
-        let own = |automaton: &Automaton| automaton.modes != self.mdp.model().modes;
+        let own = |automaton: &Automaton| automaton.modes != self.space.model().modes;
         self.automaton.is_some_and(own)
     }
 
     /// The mode or memory at the start.
     fn start_mode(&self) -> ModeId {
         let start = |automaton: &Automaton| automaton.updater.start().belief().mode;
-        self.automaton.map_or(self.mdp.start().mode, start)
+        self.automaton.map_or(self.space.start().mode, start)
     }
 
     /// Where something good is paid in a mode, but for what is paid everywhere. What is remembered is no mode, and shows all.
     fn goals(&self, mode: ModeId) -> Vec<&Region> {
-        let model = self.mdp.model();
+        let model = self.space.model();
         let rewards = model
             .rewards
             .iter()
@@ -239,7 +233,7 @@ impl Map<'_> {
     fn mode_name(&self, mode: ModeId) -> &str {
         let modes = self
             .automaton
-            .map_or(&self.mdp.model().modes, |automaton| &automaton.modes);
+            .map_or(&self.space.model().modes, |automaton| &automaton.modes);
         if modes.len() > 1 { &modes[mode] } else { "" }
     }
 }

@@ -67,7 +67,7 @@ pub fn draw(map: &Map<'_>) -> String {
     sheet.draw([], 14.0);
     if let Some(automaton) = map.automaton {
         sheet.note(match automaton.matching {
-            Matching::Nearest if map.mdp.model().state_dim() == 2 => {
+            Matching::Nearest if map.space.model().state_dim() == 2 => {
                 "Circles: the automaton's nodes. Thin lines: borders between them."
             }
             Matching::Nearest => "Thin lines: borders between the automaton's nodes.",
@@ -89,7 +89,7 @@ struct Plane<'a> {
 
 impl<'a> Plane<'a> {
     fn new(map: &'a Map<'a>) -> Self {
-        let n = map.mdp.model().state_dim();
+        let n = map.space.model().state_dim();
         let (across, up) = if n == 2 { (0, 1) } else { most_uncertain(map) };
         let levels = if n == 2 {
             chosen_levels(map)
@@ -123,9 +123,9 @@ impl<'a> Plane<'a> {
     }
 
     fn caption(&self) -> String {
-        let states = &self.map.mdp.model().state;
+        let states = &self.map.space.model().state;
         let (across, up) = (&states[self.across].name, &states[self.up].name);
-        let total = self.map.mdp.strata();
+        let total = self.map.space.strata();
         if states.len() == 2 {
             let shown = self.levels.len();
             let of = if shown < total {
@@ -136,7 +136,7 @@ impl<'a> Plane<'a> {
             let plural = if total == 1 { "level" } else { "levels" };
             return format!("Mean of {across} across, of {up} up; {of} {plural}.");
         }
-        let start = &self.map.mdp.start().mean;
+        let start = &self.map.space.start().mean;
         let others =
             (0..states.len()).filter(|&variable| variable != self.across && variable != self.up);
         let fixed: Vec<String> = others
@@ -149,7 +149,7 @@ impl<'a> Plane<'a> {
     }
 
     fn belief(&self, level: StratumId, mode: ModeId, (x, y): (f64, f64)) -> Belief {
-        let mut mean = self.map.mdp.start().mean.clone();
+        let mut mean = self.map.space.start().mean.clone();
         mean[self.across] = x;
         mean[self.up] = y;
         Belief {
@@ -162,7 +162,7 @@ impl<'a> Plane<'a> {
     /// Squared distance of a place from the plane, in the automaton's scale.
     fn apart(&self, place: &Place, scale: &[f64]) -> f64 {
         let centre = place.centre();
-        let mut mean = self.map.mdp.start().mean.clone();
+        let mut mean = self.map.space.start().mean.clone();
         mean[self.across] = centre[self.across];
         mean[self.up] = centre[self.up];
         place.distance(&mean, scale)
@@ -170,7 +170,7 @@ impl<'a> Plane<'a> {
 
     /// The part of a region that is seen: its sides along both axes, where the variables outside the plane are in it.
     fn seen(&self, region: &Region) -> Option<((f64, f64), (f64, f64))> {
-        let start = &self.map.mdp.start().mean;
+        let start = &self.map.space.start().mean;
         let (mut x, mut y) = self.extent;
         for &(variable, side) in &region.sides {
             if variable == self.across {
@@ -189,10 +189,10 @@ impl<'a> Plane<'a> {
 fn most_uncertain(map: &Map<'_>) -> (usize, usize) {
     let level = map.steady_level();
     let relative = |variable: usize| {
-        let width = map.mdp.model().state[variable].bounds.width();
+        let width = map.space.model().state[variable].bounds.width();
         map.deviation(level, variable) / if width.is_finite() { width } else { 1.0 }
     };
-    let mut variables: Vec<usize> = (0..map.mdp.model().state_dim()).collect();
+    let mut variables: Vec<usize> = (0..map.space.model().state_dim()).collect();
     variables.sort_by(|&a, &b| relative(b).total_cmp(&relative(a)).then(a.cmp(&b)));
     (
         variables[0].min(variables[1]),
@@ -220,7 +220,7 @@ struct Panel<'a> {
 
 impl Panel<'_> {
     fn draw(&self) -> Vec<Element> {
-        let states = &self.plane.map.mdp.model().state;
+        let states = &self.plane.map.space.model().state;
         let mut elements = axes::horizontal(
             &self.x,
             (self.y.paper.1, self.y.paper.0),
@@ -302,7 +302,7 @@ impl Panel<'_> {
                 .map(|column| self.plane.map.policy.action(&at(column)))
                 .collect::<Vec<_>>()
         });
-        let mut paths = vec![String::new(); self.plane.map.mdp.model().actions.len()];
+        let mut paths = vec![String::new(); self.plane.map.space.model().actions.len()];
         let (width, height) = (size.0 / columns as f64, size.1 / rows as f64);
         for (row, actions) in actions.iter().enumerate() {
             let top = self.y.paper.0 - (row + 1) as f64 * height;
@@ -337,7 +337,7 @@ impl Panel<'_> {
     }
 
     fn frame(&self) -> Element {
-        let states = &self.plane.map.mdp.model().state;
+        let states = &self.plane.map.space.model().state;
         let (across, up) = (
             states[self.plane.across].bounds,
             states[self.plane.up].bounds,
@@ -351,7 +351,7 @@ impl Panel<'_> {
 
     /// Blocked cells and thin walls of a grid map, where the plane is the map's.
     fn walls(&self) -> Vec<Element> {
-        let model = self.plane.map.mdp.model();
+        let model = self.plane.map.space.model();
         let Some(map) = model
             .map
             .as_ref()
@@ -450,7 +450,7 @@ impl Panel<'_> {
     }
 
     fn start(&self) -> Option<Element> {
-        let start = self.plane.map.mdp.start();
+        let start = self.plane.map.space.start();
         let here = self.plane.map.start_mode() == self.mode && start.stratum == self.level;
         here.then(|| {
             diamond(self.point((start.mean[self.plane.across], start.mean[self.plane.up])))

@@ -428,24 +428,7 @@ impl BeliefMdp {
 
     /// Bounds on the reward of one step, over all beliefs and actions, that of failing included: smallest, largest.
     pub fn reward_range(&self) -> (f64, f64) {
-        let failing = std::iter::once(self.model.episode.failure_reward);
-        let events = self
-            .model
-            .events
-            .iter()
-            .map(|event| event.reward)
-            .chain(failing);
-        let values = || {
-            self.model
-                .rewards
-                .iter()
-                .map(|reward| reward.value)
-                .chain(events.clone())
-        };
-        (
-            values().map(|value| value.min(0.0)).sum(),
-            values().map(|value| value.max(0.0)).sum(),
-        )
+        self.model.reward_range()
     }
 
     /// A mean as the belief keeps it: where a state can be, if the belief knows of walls.

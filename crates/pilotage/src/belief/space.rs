@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::codebook::Codebook;
-use super::{Belief, BeliefMdp, StratumId, Updater};
+use super::{Belief, BeliefMdp, Codebook, StratumId, Updater};
 use crate::model::Model;
 
 /// Beliefs as policies read them: finitely many strata, each with a covariance, and what keeps them.
@@ -27,6 +26,16 @@ pub trait BeliefSpace: Send + Sync {
 
     /// What keeps such beliefs.
     fn updater(&self) -> Updater;
+
+    /// The stratum that repeats itself, where there is one.
+    fn steady(&self) -> Option<StratumId> {
+        None
+    }
+
+    /// The decision process on uncertainty levels, where these are its beliefs.
+    fn as_mdp(&self) -> Option<&BeliefMdp> {
+        None
+    }
 
     /// The start of each hypothesis that has a belief of its own; empty where one belief holds all.
     fn hypotheses(&self) -> Vec<Belief>;
@@ -57,6 +66,14 @@ impl BeliefSpace for BeliefMdp {
         self.filter().into()
     }
 
+    fn steady(&self) -> Option<StratumId> {
+        self.levels().steady(self.start().stratum, 0)
+    }
+
+    fn as_mdp(&self) -> Option<&BeliefMdp> {
+        Some(self)
+    }
+
     fn hypotheses(&self) -> Vec<Belief> {
         match self.starts() {
             [_] => Vec::new(),
@@ -75,7 +92,7 @@ pub struct CodedSpace {
 }
 
 impl CodedSpace {
-    /// The beliefs of a model that an updater keeps and a codebook reads.
+    /// The beliefs of a model that an updater keeps and its codebook reads.
     pub fn new(model: &Model, updater: Updater, codebook: &Codebook) -> Self {
         let n = model.state_dim();
         let covariance =

@@ -169,6 +169,20 @@ impl Model {
         terminal.map_or(0.0, |cost| -quadratic(&cost.terminal, mean, covariance))
     }
 
+    /// Bounds on the reward of one step, that of failing included and what formulas and costs pay apart: smallest, largest.
+    pub fn reward_range(&self) -> (f64, f64) {
+        let events = self.events.iter().map(|event| event.reward);
+        let events = events.chain([self.episode.failure_reward]);
+        let values = || {
+            let rewards = self.rewards.iter().map(|reward| reward.value);
+            rewards.chain(events.clone())
+        };
+        (
+            values().map(|value| value.min(0.0)).sum(),
+            values().map(|value| value.max(0.0)).sum(),
+        )
+    }
+
     /// The account of a step that has not happened yet.
     pub fn tally(&self, mode: ModeId, action: ActionId) -> Tally {
         Tally {

@@ -512,23 +512,28 @@ impl Model {
     /// What keeps its belief: what [`BeliefSettings::tracker`] says or, by itself, the Kalman filter wherever nothing about state and mode is
     /// lost by it, cells for a discrete sensor, and a sum of Gaussians elsewhere.
     pub fn tracker(&self) -> TrackerKind {
-        let one_start = self.start.len() == 1
-            || self.belief.hypotheses == HypothesisBelief::Track
-            || self
-                .start
-                .iter()
-                .all(|start| start.mode == self.start[0].mode)
-                && !self.moves();
-        let exact = self.is_linear()
-            && self.modes.len() == 1
-            && self.belief.walls == WallBelief::Ignore
-            && one_start;
         match self.belief.tracker {
-            TrackerKind::Auto if exact => TrackerKind::Linear,
+            TrackerKind::Auto if self.beyond_levels().is_empty() => TrackerKind::Linear,
             TrackerKind::Auto if !self.laws.symbols.is_empty() => TrackerKind::Cells,
             TrackerKind::Auto => TrackerKind::Sum,
             chosen => chosen,
         }
+    }
+
+    /// What in it a Gaussian on uncertainty levels loses or does not follow, in words.
+    pub fn beyond_levels(&self) -> Vec<&'static str> {
+        let mut parts = self.beyond_linear();
+        if self.modes.len() > 1 && !self.laws.modes_seen {
+            parts.push("hidden modes");
+        }
+        if self.belief.walls == WallBelief::Clip {
+            parts.push("walls");
+        }
+        let tracked = self.belief.hypotheses == HypothesisBelief::Track;
+        if self.start.len() > 1 && !tracked && self.moves() {
+            parts.push("several starts");
+        }
+        parts
     }
 
     /// Whether any action moves the state, or noise does.

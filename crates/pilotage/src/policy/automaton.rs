@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::belief::{Belief, BeliefSpace, StratumId, Updater};
-use crate::model::{ActionId, Fingerprint, ModeId};
+use crate::belief::{Belief, BeliefMdp, BeliefSpace, CodedSpace, StratumId, Updater};
+use crate::model::{ActionId, Fingerprint, ModeId, Model};
 use crate::policy::{Coordinates, Policy};
 
 /// Index into [`Automaton::nodes`].
@@ -221,6 +221,14 @@ impl Automaton {
             scale: vec![1.0; model.state_dim()],
             nodes: Vec::new(),
             updater: space.updater(),
+        }
+    }
+
+    /// The beliefs of the model that it was made for, as it reads them.
+    pub fn space(&self, model: &Model) -> Box<dyn BeliefSpace> {
+        match self.updater.codebook() {
+            Some(codebook) => Box::new(CodedSpace::new(model, self.updater.clone(), codebook)),
+            None => Box::new(BeliefMdp::new(model)),
         }
     }
 

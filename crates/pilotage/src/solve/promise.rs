@@ -1,7 +1,7 @@
 //! What a plan promises, and what it earns: where its model holds, and in the world.
 
-use super::Solution;
-use crate::belief::BeliefMdp;
+use super::{Solution, Solved};
+use crate::belief::{BeliefMdp, Codebook};
 use crate::error::Result;
 use crate::model::{HypothesisBelief, Model, WallBelief};
 use crate::progress::Progress;
@@ -57,7 +57,12 @@ impl Solution {
             .planned_value
             .and_then(|planned| missed(planned, &assumed, &scenario.model));
         if let Some(missed) = missed {
-            let reasons = reasons(&scenario.model);
+            let reasons = match self.strata() {
+                Some(strata) => vec![format!(
+                    "a belief is read as a mean and one of {strata} strata, and the plan is made for what they have in common; more `strata`, `points` or `rounds` come nearer"
+                )],
+                None => reasons(&scenario.model),
+            };
             remarks.push(match reasons.is_empty() {
                 true => missed,
                 false => format!("{missed}: {}", reasons.join("; ")),
@@ -75,11 +80,23 @@ impl Solution {
     }
 }
 
+impl Solution {
+    /// How many strata beliefs are read as, where they are kept in full.
+    fn strata(&self) -> Option<usize> {
+        let updater = match &self.policy {
+            Solved::Automaton(automaton) => &automaton.updater,
+            Solved::Rule { updater, .. } => updater,
+            Solved::Control(_) => return None,
+        };
+        updater.codebook().map(Codebook::len)
+    }
+}
+
 /// Says by how much a promise misses what is earned where it should hold, if it does.
 fn missed(planned: f64, assumed: &Evaluation, model: &Model) -> Option<String> {
     let earned = &assumed.discounted;
     // What pays once in more episodes than were run may not have been seen.
-    let (low, high) = BeliefMdp::new(model).reward_range();
+    let (low, high) = model.reward_range();
     let unseen = (high - low) / assumed.episodes as f64;
     let apart = (planned - earned.mean).abs();
     let allowed = unseen + 3.0 * earned.stderr + SHARE * planned.abs().max(earned.mean.abs());
