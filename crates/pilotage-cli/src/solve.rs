@@ -27,9 +27,15 @@ pub struct Arguments {
     /// Solver to use (see `pilotage list`); default: the first planner that accepts the problem.
     #[arg(long, value_name = "SOLVER")]
     with: Option<String>,
-    /// Form of the policy: nearest, segments, or grid (the planner itself, not compiled).
-    #[arg(long, value_name = "FORM", default_value = "nearest")]
-    policy: String,
+    /// Form of the policy: tree, nearest, segments, or grid (the planner itself, not compiled); default: what suits the solver.
+    #[arg(long, value_name = "FORM")]
+    policy: Option<String>,
+    /// Most nodes of a tree; default: as many as it takes.
+    #[arg(long, value_name = "NODES", value_parser = at_least_one)]
+    nodes: Option<usize>,
+    /// Return that a tree may lose, as a share of that of the plan [default: 0.01].
+    #[arg(long, value_name = "SHARE")]
+    loss: Option<f64>,
     /// Write the policy to this file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -301,14 +307,13 @@ fn without(registry: &Registry, entry: &Entry, what: &str, setting: &str) -> Fai
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let form = Form::parse(&arguments.policy)?;
     let registry = Registry::builtin();
     let named = arguments.with.as_deref();
     let named = named.map(|name| registry.find(name)).transpose()?;
-    if arguments.out.is_some() && form == Form::Grid {
+    let asked = arguments.policy.as_deref().map(Form::parse).transpose()?;
+    if arguments.out.is_some() && asked == Some(Form::Grid) {
         return Err(Failure::Usage(
-            "a planner that is not compiled cannot be saved; choose --policy nearest or segments"
-                .to_owned(),
+            "a planner that is not compiled cannot be saved; choose another --policy".to_owned(),
         ));
     }
     let scenario = scenario::find(&arguments.problem)?;
@@ -324,6 +329,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let (solver, runs) = arguments.told.solver(&registry, entry)?;
     let solver = &solver;
+    let form = asked.unwrap_or_else(|| solver.form());
+    if form != Form::Tree && (arguments.nodes.is_some() || arguments.loss.is_some()) {
+        return Err(Failure::Usage(
+            "--nodes and --loss say how small a tree is; choose --policy tree".to_owned(),
+        ));
+    }
     if arguments.out.is_some() && !solver.makes_automaton(&scenario.model) {
         return Err(Failure::Usage(format!(
             "{} finds a free control for {}, which is no automaton and cannot be saved; leave out --out",
@@ -335,6 +346,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         form,
         seed: arguments.evaluation.seed,
         runs,
+        nodes: arguments.nodes,
+        loss: arguments.loss,
         checkpoint: arguments.learner.checkpoint.clone(),
     };
     arguments.check_files()?;
@@ -417,13 +430,15 @@ fn value_lost(
 ) -> Result<Estimate, Failure> {
     let uncompiled = Request {
         form: Form::Grid,
+        nodes: None,
+        loss: None,
         ..request.clone()
     };
     let planner = solve(solver, scenario, &uncompiled, bars)?;
     let options = arguments.evaluation.options();
     solution
         .value_lost(&planner, scenario, options, bars)
-        .ok_or_else(|| Failure::Usage("--value-lost compares an automaton with the planner it was compiled from; choose --policy nearest or segments".to_owned()))
+        .ok_or_else(|| Failure::Usage("--value-lost compares an automaton with the planner it was compiled from; choose --policy tree, nearest or segments".to_owned()))
 }
 
 fn report(
@@ -438,7 +453,7 @@ fn report(
         "pilotage": env!("CARGO_PKG_VERSION"),
         "problem": scenario.model.name,
         "solver": solver.name(),
-        "policy": solution.automaton().map_or(json!(arguments.policy), |automaton| json!(automaton.matching)),
+        "policy": solution.automaton().map_or(json!(Form::Grid.name()), |automaton| json!(automaton.matching)),
         "seed": arguments.evaluation.seed,
         "converged": solution.converged,
         "policy_convergence_horizon": solution.policy_convergence_horizon,

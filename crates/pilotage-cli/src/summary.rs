@@ -145,7 +145,16 @@ pub fn nodes(automaton: &Automaton) -> String {
     } else {
         String::new()
     };
-    format!("{}{more}", table.trim_fmt())
+    // A tree that fills more than a screen is read in its file.
+    let tree = match automaton.nodes.len() <= ROWS {
+        true => automaton.conditions(),
+        false => String::new(),
+    };
+    let tree = match tree.is_empty() {
+        true => tree,
+        false => format!("\n\n{tree}"),
+    };
+    format!("{}{more}{tree}", table.trim_fmt())
 }
 
 fn levels((first, last): (usize, usize)) -> String {

@@ -73,7 +73,7 @@ fn made_up(name: &str, matching: Matching, count: usize) -> Automaton {
             .collect();
         let place = match matching {
             Matching::Nearest => Place::Point(point),
-            Matching::Segments => Place::Segment {
+            Matching::Segments | Matching::Tree => Place::Segment {
                 upper: point.iter().map(|x| x + 0.3).collect(),
                 minimum: point.clone(),
                 lower: point,

@@ -505,7 +505,7 @@ pub fn convergence(context: &Context<'_>) -> Result<Finding> {
             let generated = generate::generate(&mdp, &settings, &Silent)?;
             let form = match matching {
                 Matching::Segments => "segments",
-                Matching::Nearest => "nearest",
+                Matching::Nearest | Matching::Tree => "nearest",
             };
             series.push(Series {
                 name: format!("{name}, {form}"),

@@ -86,7 +86,7 @@ fn synthetic(nodes: usize, matching: Matching) -> Automaton {
         };
         let place = match matching {
             Matching::Nearest => Place::Point(corner(0.0)),
-            Matching::Segments => Place::Segment {
+            Matching::Segments | Matching::Tree => Place::Segment {
                 lower: corner(-0.1),
                 minimum: corner(0.0),
                 upper: corner(0.1),

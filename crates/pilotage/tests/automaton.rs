@@ -158,7 +158,7 @@ proptest! {
             // A segment for every interval; a point for every interval, or two for every border. Borders beside the way count too.
             let borders = pieces.borders.len();
             let most = match matching {
-                Matching::Segments => borders + 1,
+                Matching::Segments | Matching::Tree => borders + 1,
                 Matching::Nearest => (borders + 1).max(2 * borders),
             };
             prop_assert!(automaton.nodes.len() <= most);

@@ -236,6 +236,7 @@ fn subtitle(automaton: &Automaton) -> String {
     let matching = match automaton.matching {
         Matching::Nearest => "nearest point",
         Matching::Segments => "belief segments",
+        Matching::Tree => "a decision tree",
     };
     let plural = if nodes == 1 { "" } else { "s" };
     format!(

@@ -56,6 +56,9 @@ pub fn draw(map: &Map<'_>) -> String {
             Matching::Segments => {
                 "Frames: the automaton's segments. Dots: their points of least value."
             }
+            Matching::Tree => {
+                "Frames: where the beliefs of the tree's nodes lie. Dots: their middles."
+            }
         });
     }
     sheet.note("σ: standard deviation, P: variance of the belief. Faint vertical lines: bounds of the world.");

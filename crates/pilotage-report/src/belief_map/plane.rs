@@ -72,6 +72,7 @@ pub fn draw(map: &Map<'_>) -> String {
             }
             Matching::Nearest => "Thin lines: borders between the automaton's nodes.",
             Matching::Segments => "Thin frames: the automaton's segments.",
+            Matching::Tree => "Thin frames: where the beliefs of the tree's nodes lie.",
         });
     }
     sheet.note("σ: standard deviation of the belief. Dashed: bounds of the world.");
@@ -390,7 +391,7 @@ impl Panel<'_> {
         let nodes: Vec<&Node> = self.plane.map.nodes(self.mode).filter(holds).collect();
         match automaton.matching {
             Matching::Nearest => self.points(&nodes, &automaton.scale),
-            Matching::Segments => self.segments(&nodes, &automaton.scale),
+            Matching::Segments | Matching::Tree => self.segments(&nodes, &automaton.scale),
         }
     }
 

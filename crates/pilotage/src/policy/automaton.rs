@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::belief::{Belief, BeliefMdp, BeliefSpace, CodedSpace, StratumId, Updater};
 use crate::model::{ActionId, Fingerprint, ModeId, Model};
-use crate::policy::{Coordinates, Policy};
+use crate::policy::{Coordinates, Policy, StratumFeatures, Tree};
 
 /// Index into [`Automaton::nodes`].
 pub type NodeId = usize;
@@ -37,13 +37,15 @@ pub struct Automaton {
     pub coordinates: Option<Coordinates>,
     /// Scale of each state variable, or coordinate, when distances are measured; 1 leaves it.
     pub scale: Vec<f64>,
+    /// The tree by which a belief finds its node, where [`Matching::Tree`] is how.
+    pub tree: Option<Tree>,
     /// The nodes.
     pub nodes: Vec<Node>,
     /// What keeps the belief.
     pub updater: Updater,
 }
 
-/// How a belief finds its node among those of its level and mode.
+/// How a belief finds its node, among those of its level and mode or by a tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Matching {
@@ -51,6 +53,8 @@ pub enum Matching {
     Nearest,
     /// The smallest box that holds the mean; outside all, the nearest box (5.4.1).
     Segments,
+    /// The node that a decision tree leads to.
+    Tree,
 }
 
 /// A node of the automaton.
@@ -219,6 +223,7 @@ impl Automaton {
             planned_value: None,
             coordinates: None,
             scale: vec![1.0; model.state_dim()],
+            tree: None,
             nodes: Vec::new(),
             updater: space.updater(),
         }
@@ -234,6 +239,10 @@ impl Automaton {
 
     /// The node of a belief; `None` only without nodes.
     pub fn matched(&self, belief: &Belief) -> Option<NodeId> {
+        if let Some(tree) = &self.tree {
+            let features = StratumFeatures::of(self, belief.stratum);
+            return (!self.nodes.is_empty()).then(|| tree.find(&features, belief));
+        }
         let candidates = self.candidates(belief.stratum, belief.mode);
         match &self.coordinates {
             None => self.closest(candidates, &belief.mean),

@@ -5,10 +5,10 @@ use crate::model::ActionId;
 use crate::policy::{Automaton, Matching, Node, NodeId, Place};
 
 impl Automaton {
-    /// Takes in a belief with its best action and value, by the rule of the automaton's own form; returns its node.
+    /// Takes in a belief with its best action and value, by the rule of the automaton's own form, points for a tree; returns its node.
     pub fn learn(&mut self, belief: &Belief, action: ActionId, value: f64) -> NodeId {
         match self.matching {
-            Matching::Nearest => self.learn_point(belief, action, value),
+            Matching::Nearest | Matching::Tree => self.learn_point(belief, action, value),
             Matching::Segments => self.learn_segment(belief, action, value),
         }
     }

@@ -11,7 +11,7 @@ use super::file::{
     BeliefTable, CoordinateTable, Ends, FilterTable, LevelTable, MapTable, MemoryTable, NodeTable,
     PolicyTable, RecallTable, Rows, SideTable, StepTable, StratumTable, SwitchTable, WallsTable,
 };
-use super::{Matching, Place};
+use super::{Branch, Feature, Matching, Place, Test};
 use crate::belief::LARGEST;
 use crate::error::is_unseen;
 use crate::model::{Path, Step, TrackerKind};
@@ -162,6 +162,15 @@ impl PolicyTable {
         }
         vector(&self.scale, sizes.coordinates).at("scale")?;
         each(&self.scale, |scale| at_least_least(*scale)).at("scale")?;
+        if self.tree.is_some() != (self.matching == Matching::Tree) {
+            return Err(Fault::new(
+                "a tree belongs to `matching = \"tree\"`, and to nothing else",
+            ))
+            .at("tree");
+        }
+        if let Some(tests) = &self.tree {
+            check_tree(tests, &sizes).at("tree")?;
+        }
         some(&self.nodes).at("nodes")?;
         each(&self.nodes, |node| node.check(self.matching, &sizes)).at("nodes")?;
         self.check_compared(&sizes).at("nodes")
@@ -357,6 +366,33 @@ impl RecallTable {
     }
 }
 
+/// Tests lead forward only, so that every belief arrives at a node.
+fn check_tree(tests: &[Test], sizes: &Sizes) -> Checked {
+    let numbered: Vec<(usize, &Test)> = tests.iter().enumerate().collect();
+    each(&numbered, |(number_, test)| {
+        match test.feature {
+            Feature::Mean(variable) | Feature::Deviation(variable) => {
+                index(variable, sizes.states, "state variables").at("feature")?;
+            }
+            Feature::Mode(mode) => sizes.mode(&mode).at("feature")?,
+        }
+        number(test.less_than).at("less_than")?;
+        for (key, branch) in [("yes", test.yes), ("no", test.no)] {
+            match branch {
+                Branch::Node(node) => index(node, sizes.nodes, "nodes").at(key)?,
+                Branch::Test(next) => {
+                    index(next, tests.len(), "tests").at(key)?;
+                    if next <= *number_ {
+                        let message = format!("test {next}, which does not come later");
+                        return Err(Fault::new(message)).at(key);
+                    }
+                }
+            }
+        }
+        Ok(())
+    })
+}
+
 fn check_coordinates(coordinates: &[CoordinateTable], sizes: &Sizes) -> Checked {
     if !(1..=MOST_COORDINATES).contains(&coordinates.len()) {
         let count = coordinates.len();
@@ -415,7 +451,7 @@ fn check_place(place: &Place, matching: Matching, coordinates: usize) -> Checked
                 minimum,
                 upper,
             },
-            Matching::Segments,
+            Matching::Segments | Matching::Tree,
         ) => {
             for (key, corner) in [("lower", lower), ("minimum", minimum), ("upper", upper)] {
                 vector(corner, coordinates).at(key).at("segment")?;
@@ -435,8 +471,8 @@ fn check_place(place: &Place, matching: Matching, coordinates: usize) -> Checked
         (_, Matching::Nearest) => Err(Fault::new(
             "a segment, where matching by `nearest` has points",
         )),
-        (_, Matching::Segments) => Err(Fault::new(
-            "a point, where matching by `segments` has segments",
+        (_, Matching::Segments | Matching::Tree) => Err(Fault::new(
+            "a point, where matching by `segments` or `tree` has segments",
         )),
     }
 }

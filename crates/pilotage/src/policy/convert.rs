@@ -6,7 +6,7 @@ use super::file::{
     ObservedTable, PhaseTable, PolicyTable, RecallTable, Rows, SideTable, StartTable, StepTable,
     StratumTable, SwitchTable, WallsTable,
 };
-use super::{Automaton, Coordinates, Node, Observed};
+use super::{Automaton, Coordinates, Node, Observed, Tree};
 use std::sync::Arc;
 
 use crate::belief::{Clusters, Codebook, Filter, Recall, Updater};
@@ -60,6 +60,7 @@ impl PolicyTable {
             matching: automaton.matching,
             coordinates: automaton.coordinates.as_ref().map(coordinate_tables),
             scale: automaton.scale.clone(),
+            tree: automaton.tree.as_ref().map(|tree| tree.tests.clone()),
             nodes: automaton
                 .nodes
                 .iter()
@@ -127,6 +128,7 @@ impl PolicyTable {
                 Coordinates { names, rows }
             }),
             scale: self.scale,
+            tree: self.tree.map(|tests| Tree { tests }),
             nodes: self.nodes.into_iter().map(NodeTable::node).collect(),
         })
     }

@@ -4,7 +4,7 @@
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 
-use super::{Matching, Place};
+use super::{Matching, Place, Test};
 use crate::model::{Fingerprint, TrackerKind, When};
 
 /// Version of the file format; a file of another is refused.
@@ -82,6 +82,10 @@ pub(super) struct PolicyTable {
     pub coordinates: Option<Vec<CoordinateTable>>,
     /// What distances are divided by, more than 0: a number for each coordinate.
     pub scale: Vec<f64>,
+    /// Tests by which a belief finds its node, with `matching = "tree"`: it begins with the first, and each comes before those it leads
+    /// to. A feature is `mean` or `deviation` of a state variable or the probability of a `mode`, by number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tree: Option<Vec<Test>>,
     /// The nodes, at least one.
     #[schemars(length(min = 1))]
     pub nodes: Vec<NodeTable>,

@@ -14,12 +14,15 @@ mod file;
 mod layout;
 mod runner;
 mod store;
+mod tree;
 
 pub use crate::files::{check_writable, write_whole};
 pub use automaton::{Automaton, Matching, Node, NodeId, Observed, Place};
 pub use coordinates::{Coordinates, MOST_COORDINATES};
 pub use file::schema;
 pub use runner::AutomatonRunner;
+pub(crate) use tree::StratumFeatures;
+pub use tree::{Branch, Feature, Test, Tree};
 
 use crate::belief::Belief;
 use crate::model::ActionId;

@@ -2,7 +2,10 @@
 
 use crate::belief::{Belief, Held, Reading, Updater};
 use crate::model::ActionId;
-use crate::policy::{Automaton, Coordinates, MOST_COORDINATES, Matching, NodeId, Place, Policy};
+use crate::policy::{
+    Automaton, Coordinates, MOST_COORDINATES, Matching, NodeId, Place, Policy, StratumFeatures,
+    Tree,
+};
 
 /// Nodes compared at a time, side by side in memory so that one instruction serves several.
 const LANES: usize = 8;
@@ -12,6 +15,8 @@ const LANES: usize = 8;
 pub struct AutomatonRunner {
     updater: Updater,
     matching: Matching,
+    /// The tree, with what it may ask of each stratum.
+    tree: Option<(Tree, Vec<StratumFeatures>)>,
     coordinates: Option<Coordinates>,
     levels: usize,
     /// By mode and level: the blocks of candidates from the first up to, not including, the last.
@@ -33,6 +38,10 @@ impl AutomatonRunner {
         let levels = automaton.levels.len();
         let mut controller = Self {
             matching: automaton.matching,
+            tree: automaton.tree.as_ref().map(|tree| {
+                let features = |stratum| StratumFeatures::of(automaton, stratum);
+                (tree.clone(), (0..levels).map(features).collect())
+            }),
             coordinates: automaton.coordinates.clone(),
             levels,
             ranges: Vec::new(),
@@ -42,6 +51,11 @@ impl AutomatonRunner {
             held: updater.start(),
             updater,
         };
+        if controller.tree.is_some() {
+            let nodes = automaton.nodes.iter().enumerate();
+            controller.nodes = nodes.map(|(id, node)| (id, node.action)).collect();
+            return controller;
+        }
         for mode in 0..automaton.modes.len() {
             let own = automaton.of_mode(mode);
             for level in 0..levels {
@@ -101,6 +115,10 @@ impl AutomatonRunner {
     }
 
     fn decide_at(&self, belief: &Belief) -> (NodeId, ActionId) {
+        if let Some((tree, features)) = &self.tree {
+            let node = tree.find(&features[belief.stratum], belief);
+            return self.nodes.get(node).copied().unwrap_or((0, 0));
+        }
         let (from, to) = self
             .ranges
             .get(belief.mode * self.levels + belief.stratum)
@@ -122,7 +140,9 @@ impl AutomatonRunner {
 
     fn match_place(&self, from: usize, to: usize, place: &[f64]) -> usize {
         match self.matching {
-            Matching::Nearest => self.closest::<1>(from, to, place, |[point], at| point - at),
+            Matching::Nearest | Matching::Tree => {
+                self.closest::<1>(from, to, place, |[point], at| point - at)
+            }
             Matching::Segments => self.closest::<2>(from, to, place, |[lower, upper], at| {
                 // `f64::max` would also look after NaN, of which there is none.
                 let (below, above) = (lower - at, at - upper);

@@ -64,7 +64,7 @@ pub fn plan(
             policy,
             updater: space.updater(),
         },
-        (Found::Rule { policy, space }, Form::Nearest | Form::Segments) => {
+        (Found::Rule { policy, space }, Form::Nearest | Form::Segments | Form::Tree) => {
             let settings = compiler(request);
             let mut automaton =
                 compile::compile(policy.as_ref(), space.as_ref(), planner.name(), &settings)?;
@@ -115,7 +115,7 @@ pub fn learn(
     let lesson = learner.learn(&problem, &worlds, request.checkpoint.as_deref(), observer)?;
     Ok(Solution {
         policy: match request.form {
-            Form::Nearest | Form::Segments => {
+            Form::Nearest | Form::Segments | Form::Tree => {
                 Solved::Automaton(annotated(lesson.automaton, &problem, request))
             }
             Form::Grid => asked_anew(&lesson.automaton),
@@ -134,6 +134,8 @@ fn compiler(request: &Request) -> compile::Settings {
     compile::Settings {
         matching: request.form.matching(),
         episodes: request.runs,
+        nodes: request.nodes,
+        loss: request.loss,
         seed: request.seed,
         ..compile::Settings::default()
     }

@@ -17,19 +17,22 @@ pub enum Form {
     Nearest,
     /// An automaton of belief segments (5.4.1).
     Segments,
+    /// An automaton whose nodes are the leaves of a decision tree.
+    Tree,
     /// The planner itself, asked at every belief: nothing is compiled.
     Grid,
 }
 
 impl Form {
     /// All forms.
-    pub const ALL: [Self; 3] = [Self::Nearest, Self::Segments, Self::Grid];
+    pub const ALL: [Self; 4] = [Self::Nearest, Self::Segments, Self::Tree, Self::Grid];
 
     /// Its name, as on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Nearest => "nearest",
             Self::Segments => "segments",
+            Self::Tree => "tree",
             Self::Grid => "grid",
         }
     }
@@ -52,6 +55,7 @@ impl Form {
         match self {
             Self::Nearest | Self::Grid => Matching::Nearest,
             Self::Segments => Matching::Segments,
+            Self::Tree => Matching::Tree,
         }
     }
 }

@@ -116,6 +116,14 @@ impl Solver {
         }
     }
 
+    /// The form that suits what it finds: a tree where beliefs are kept in full, nearest points on uncertainty levels.
+    pub fn form(&self) -> Form {
+        match self {
+            Self::Planner(planner) if !planner.needs_levels() => Form::Tree,
+            _ => Form::Nearest,
+        }
+    }
+
     /// Whether what it finds for a model becomes an automaton: all but a free control does.
     pub fn makes_automaton(&self, model: &Model) -> bool {
         match self {
@@ -126,12 +134,16 @@ impl Solver {
 }
 
 /// What is asked of a solver, whichever it is.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     /// Form of the policy.
     pub form: Form,
     /// Seed of every random number.
     pub seed: u64,
+    /// Most nodes of an automaton in the form of a tree, at least 1; `None` for as many as it takes.
+    pub nodes: Option<usize>,
+    /// Return that such an automaton may lose, as a share of that of the plan; `None` for 1 %.
+    pub loss: Option<f64>,
     /// Episodes run to see which beliefs a policy meets, 1 to a million.
     pub runs: usize,
     /// File in which a learner keeps its state, to go on from there if it is stopped.
@@ -143,6 +155,8 @@ impl Default for Request {
         Self {
             form: Form::default(),
             seed: 1,
+            nodes: None,
+            loss: None,
             runs: 2000,
             checkpoint: None,
         }

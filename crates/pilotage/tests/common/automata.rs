@@ -140,7 +140,7 @@ fn node(automaton: &Automaton, parts: &Parts) -> Node {
     let upper: Vec<f64> = lower.iter().zip(width).map(|(x, w)| x + w).collect();
     let place = match automaton.matching {
         Matching::Nearest => Place::Point(lower),
-        Matching::Segments => Place::Segment {
+        Matching::Segments | Matching::Tree => Place::Segment {
             minimum: lower.clone(),
             lower,
             upper,

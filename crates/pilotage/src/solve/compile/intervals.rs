@@ -51,7 +51,7 @@ pub(super) fn place(automaton: &mut Automaton, policy: &dyn Policy, band: &Band)
                 add(automaton, place, run.action, value);
             }
         }
-        Matching::Nearest => {
+        Matching::Nearest | Matching::Tree => {
             for (x, action) in points(&runs) {
                 add(
                     automaton,

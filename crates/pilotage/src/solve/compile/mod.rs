@@ -8,6 +8,7 @@ mod annotate;
 mod intervals;
 pub(crate) mod planes;
 mod samples;
+mod trees;
 
 pub use annotate::annotate;
 
@@ -29,6 +30,10 @@ pub struct Settings {
     pub episodes: usize,
     /// Share of the decisions of a level, in `[0, 1)`, that may come out differently.
     pub slack: f64,
+    /// Most nodes of a tree; `None` for as many as it takes.
+    pub nodes: Option<usize>,
+    /// Return that a tree may lose, as a share of that of the policy, at least 0; `None` for 1 %.
+    pub loss: Option<f64>,
     /// Seed of the episodes.
     pub seed: u64,
 }
@@ -39,7 +44,39 @@ impl Default for Settings {
             matching: Matching::Nearest,
             episodes: 2000,
             slack: 0.002,
+            nodes: None,
+            loss: None,
             seed: 1,
+        }
+    }
+}
+
+/// Share of the policy's return that a tree may lose, unless it is said.
+const LOSS: f64 = 0.01;
+
+/// Most nodes of a tree, unless it is said.
+const MOST_NODES: usize = 1000;
+
+impl Settings {
+    /// How small it may be is said of trees alone.
+    fn check_size(&self) -> Result<()> {
+        let fail = |setting, value: String, range| {
+            Err(Error::Setting {
+                setting,
+                value,
+                range,
+            })
+        };
+        match (self.nodes, self.loss) {
+            (Some(nodes), _) if nodes == 0 => fail("nodes", nodes.to_string(), "at least 1"),
+            (_, Some(loss)) if !(loss >= 0.0) => fail("loss", loss.to_string(), "at least 0"),
+            (Some(nodes), _) if self.matching != Matching::Tree => {
+                fail("nodes", nodes.to_string(), "for the form tree alone")
+            }
+            (_, Some(loss)) if self.matching != Matching::Tree => {
+                fail("loss", loss.to_string(), "for the form tree alone")
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -104,7 +141,20 @@ pub fn compile(
             range: "at least 0 and below 1",
         });
     }
+    settings.check_size()?;
     let model = space.model();
+    if settings.matching == Matching::Tree {
+        let mut automaton = Automaton::new(space, solver, Matching::Tree);
+        automaton.planned_value = policy.value(space.start());
+        let size = trees::Size {
+            nodes: settings.nodes.unwrap_or(MOST_NODES),
+            loss: settings.loss.unwrap_or(LOSS),
+        };
+        let runs = (settings.episodes, settings.seed);
+        trees::grow(&mut automaton, policy, space, size, runs);
+        annotate(&mut automaton, space, settings.episodes, settings.seed);
+        return Ok(automaton);
+    }
     let met = meet(space, policy, settings);
     let mut automaton = Automaton::new(space, solver, settings.matching);
     automaton.planned_value = policy.value(space.start());

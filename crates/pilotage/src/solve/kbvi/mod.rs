@@ -14,6 +14,7 @@ use super::solver::{Found, Plan, Planner, Problem, refuse_if};
 use super::{Form, refusals};
 use crate::error::Result;
 use crate::model::Model;
+use crate::policy::Matching;
 use crate::progress::Progress;
 use branches::Branches;
 use formulas::Formulas;
@@ -94,7 +95,10 @@ impl Planner for Kbvi {
             formulas: self.formulas,
         };
         let settings = generate::Settings {
-            matching: problem.form().matching(),
+            matching: match problem.form() {
+                Form::Segments => Matching::Segments,
+                Form::Nearest | Form::Tree | Form::Grid => Matching::Nearest,
+            },
             search,
             last_horizon: self.last_horizon,
             repeats: self.repeats,
@@ -105,7 +109,7 @@ impl Planner for Kbvi {
         let generated = generate::generate(problem.mdp(), &settings, observer)?;
         let value = generated.automaton.planned_value;
         let policy = match problem.form() {
-            Form::Nearest | Form::Segments => Found::Automaton(generated.automaton),
+            Form::Nearest | Form::Segments | Form::Tree => Found::Automaton(generated.automaton),
             Form::Grid => {
                 let last = generated.history.last();
                 let horizon = last.map_or(search.horizon, |last| last.0);

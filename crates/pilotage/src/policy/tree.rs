@@ -1,0 +1,155 @@
+//! Nodes found by a decision tree: questions about a belief, one after the other, until a node is left.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Automaton, NodeId};
+use crate::belief::{Belief, StratumId};
+use crate::model::ModeId;
+
+/// Something about a belief that a tree asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Feature {
+    /// The mean of a state variable.
+    Mean(usize),
+    /// Its standard deviation at the belief's stratum.
+    Deviation(usize),
+    /// Probability of a mode at the stratum; 1 or 0 where one mode is believed.
+    Mode(ModeId),
+}
+
+/// Where a tree goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Branch {
+    /// At a node: it is found.
+    Node(NodeId),
+    /// With another test.
+    Test(usize),
+}
+
+/// A question: whether a feature is less than a number.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct Test {
+    /// What is asked for.
+    pub feature: Feature,
+    /// The number.
+    pub less_than: f64,
+    /// Where to go on if it is less.
+    pub yes: Branch,
+    /// Where to go on if it is not.
+    pub no: Branch,
+}
+
+/// A decision tree over beliefs. It begins with the first test; without tests, all beliefs are at node 0.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Tree {
+    /// The tests, each before those that it leads to.
+    pub tests: Vec<Test>,
+}
+
+/// What a tree may ask of the beliefs of a stratum, means apart.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StratumFeatures {
+    /// Standard deviations, length `n`.
+    pub deviations: Vec<f64>,
+    /// Probability of each mode; `None` where one is believed.
+    pub weights: Option<Vec<f64>>,
+}
+
+impl StratumFeatures {
+    /// Those of a stratum of an automaton.
+    pub(crate) fn of(automaton: &Automaton, stratum: StratumId) -> Self {
+        let n = automaton.states.len();
+        let covariance = &automaton.levels[stratum];
+        let deviation = |i: usize| covariance[i * n + i].max(0.0).sqrt();
+        let codebook = automaton.updater.codebook();
+        Self {
+            deviations: (0..n).map(deviation).collect(),
+            weights: codebook.map(|codebook| codebook.stratum(stratum).weights.clone()),
+        }
+    }
+
+    /// What a feature is at a belief of the stratum.
+    pub(crate) fn value(&self, feature: Feature, belief: &Belief) -> f64 {
+        match feature {
+            Feature::Mean(variable) => belief.mean[variable],
+            Feature::Deviation(variable) => self.deviations[variable],
+            Feature::Mode(mode) => match &self.weights {
+                Some(weights) => weights[mode],
+                None => f64::from(belief.mode == mode),
+            },
+        }
+    }
+}
+
+impl Tree {
+    /// The node of a belief at a stratum with these features.
+    pub(crate) fn find(&self, features: &StratumFeatures, belief: &Belief) -> NodeId {
+        let mut branch = match self.tests.is_empty() {
+            true => Branch::Node(0),
+            false => Branch::Test(0),
+        };
+        loop {
+            match branch {
+                Branch::Node(node) => return node,
+                Branch::Test(test) => {
+                    let test = &self.tests[test];
+                    branch = match features.value(test.feature, belief) < test.less_than {
+                        true => test.yes,
+                        false => test.no,
+                    };
+                }
+            }
+        }
+    }
+}
+
+impl Automaton {
+    /// The tree as nested conditions, a line for each test and node; empty for an automaton without a tree.
+    pub fn conditions(&self) -> String {
+        let mut lines = Vec::new();
+        if let Some(tree) = &self.tree {
+            let first = match tree.tests.is_empty() {
+                true => Branch::Node(0),
+                false => Branch::Test(0),
+            };
+            self.write_branch(tree, first, 0, &mut lines);
+        }
+        lines.join("\n")
+    }
+
+    fn write_branch(&self, tree: &Tree, branch: Branch, depth: usize, lines: &mut Vec<String>) {
+        let indent = "  ".repeat(depth);
+        match branch {
+            Branch::Node(id) => {
+                let node = &self.nodes[id];
+                lines.push(format!("{indent}{}  # {id}", self.actions[node.action]));
+            }
+            Branch::Test(test) => {
+                let test = &tree.tests[test];
+                let asked = self.feature_name(test.feature);
+                lines.push(format!("{indent}if {asked} < {}:", rounded(test.less_than)));
+                self.write_branch(tree, test.yes, depth + 1, lines);
+                lines.push(format!("{indent}else:"));
+                self.write_branch(tree, test.no, depth + 1, lines);
+            }
+        }
+    }
+
+    /// What a feature is called: the state variable, its standard deviation `sd_x`, the probability `p_m` of a mode.
+    pub fn feature_name(&self, feature: Feature) -> String {
+        match feature {
+            Feature::Mean(variable) => self.states[variable].clone(),
+            Feature::Deviation(variable) => format!("sd_{}", self.states[variable]),
+            Feature::Mode(mode) => format!("p_{}", self.modes[mode]),
+        }
+    }
+}
+
+/// A number with four significant digits, as a person would write it.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
