@@ -19,7 +19,7 @@ fn automaton(name: &str, matching: Matching) -> Automaton {
         };
         let place = match matching {
             Matching::Nearest => Place::Point(corner(0.0)),
-            Matching::Segments => Place::Segment {
+            Matching::Segments | Matching::Tree => Place::Segment {
                 lower: corner(-0.2),
                 minimum: corner(0.0),
                 upper: corner(0.2),
