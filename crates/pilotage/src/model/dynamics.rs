@@ -203,6 +203,13 @@ impl Dynamics {
         }
     }
 
+    /// `A`, row by row, and `B u + d`, where no formula moves the state.
+    pub fn linear_transition(&self, doing: Doing) -> Option<(&[f64], &[f64])> {
+        let rule = self.rule(doing);
+        let linear = rule.step.iter().all(Option::is_none);
+        linear.then_some((&rule.a, &rule.shift))
+    }
+
     /// Writes the covariance of the noise that is added to it, `n x n`.
     pub fn transition_noise(&self, doing: Doing, state: &[f64], covariance: &mut [f64]) {
         let rule = self.rule(doing);
@@ -236,6 +243,15 @@ impl Dynamics {
                 VariableKind::Real => {}
                 VariableKind::Integer => *value = value.round(),
                 VariableKind::Angle => *value = wrapped(*value),
+            }
+        }
+    }
+
+    /// Wraps angles.
+    pub(crate) fn wrap(&self, state: &mut [f64]) {
+        for (value, kind) in state.iter_mut().zip(&self.kinds) {
+            if *kind == VariableKind::Angle {
+                *value = wrapped(*value);
             }
         }
     }

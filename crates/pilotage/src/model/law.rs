@@ -24,6 +24,19 @@ pub struct Point<'a> {
 /// Most numbers that a formula is told: state variables, controls and the step.
 pub(crate) const MOST_TOLD: usize = 32;
 
+const FEW_TOLD: usize = 6;
+
+impl Point<'_> {
+    /// The value of an expression here, with room for what it is told.
+    fn tell(&self, expression: &Expression, told: &mut [f64]) -> f64 {
+        let (n, p) = (self.state.len(), self.control.len());
+        told[..n].copy_from_slice(self.state);
+        told[n..n + p].copy_from_slice(self.control);
+        told[n + p] = self.step as f64;
+        expression.value(&told[..=n + p])
+    }
+}
+
 /// A number that may depend on state, control and step.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Formula {
@@ -57,12 +70,11 @@ impl Formula {
             Self::Number(value) => *value,
             Self::Coded(coded) => (coded.function)(point),
             Self::Written(expression) => {
-                let mut told = [0.0; MOST_TOLD];
-                let (n, p) = (point.state.len(), point.control.len());
-                told[..n].copy_from_slice(point.state);
-                told[n..n + p].copy_from_slice(point.control);
-                told[n + p] = point.step as f64;
-                expression.value(&told[..=n + p])
+                // Most models are told little, and much room takes long to clear.
+                match point.state.len() + point.control.len() < FEW_TOLD {
+                    true => point.tell(expression, &mut [0.0; FEW_TOLD]),
+                    false => point.tell(expression, &mut [0.0; MOST_TOLD]),
+                }
             }
         }
     }

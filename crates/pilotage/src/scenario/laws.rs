@@ -133,7 +133,9 @@ impl Writing {
         let rest = Scalar::Expression(format!("1 - ({})", sum.join(" + ")));
         let mut found = vec![None; known.len()];
         let mut rests = 0;
-        for (name, scalar) in &table.0 {
+        // The rest is written with the others, which are looked at first.
+        let (others, last): (Vec<_>, Vec<_>) = table.0.iter().partition(|(_, scalar)| !is_rest(scalar));
+        for (name, scalar) in others.into_iter().chain(last) {
             let path = path.clone().key(name);
             let signal = known
                 .iter()
@@ -289,21 +291,27 @@ fn varying(matrix: Option<DMatrix<Formula>>) -> Option<DMatrix<Formula>> {
     matrix.filter(|matrix| matrix.iter().any(|entry| entry.constant().is_none()))
 }
 
-/// A matrix of numbers from one that may have expressions, which count as `otherwise`.
-pub(super) fn numbers(
-    rows: &ScalarRows,
-    otherwise: impl Fn(usize, usize) -> f64,
+/// A matrix of numbers from one that may have expressions, which count as 0 until [`constant`] says what they are.
+pub(super) fn numbers(rows: &ScalarRows, path: Path) -> Result<DMatrix<f64>, Fault> {
+    let number = |scalar: &Scalar| match scalar {
+        Scalar::Number(value) => *value,
+        Scalar::Expression(_) => 0.0,
+    };
+    let rows = rows.iter().map(|row| row.iter().map(number).collect());
+    matrix(&rows.collect(), path)
+}
+
+/// A matrix whose expressions are all numbers, such as `"0.1^2"`.
+pub(super) fn constant(
+    rows: &Option<ScalarRows>,
+    writing: &Writing,
     path: Path,
-) -> Result<DMatrix<f64>, Fault> {
-    let written = rows.iter().enumerate().map(|(i, row)| {
-        let row = row.iter().enumerate();
-        row.map(|(j, scalar)| match scalar {
-            Scalar::Number(value) => *value,
-            Scalar::Expression(_) => otherwise(i, j),
-        })
-        .collect()
-    });
-    matrix(&written.collect(), path)
+) -> Result<Option<DMatrix<f64>>, Fault> {
+    let Some(matrix) = writing.optional(rows, path)? else {
+        return Ok(None);
+    };
+    let entries: Option<Vec<f64>> = matrix.iter().map(Formula::constant).collect();
+    Ok(entries.map(|entries| DMatrix::from_vec(matrix.nrows(), matrix.ncols(), entries)))
 }
 
 /// How the sensor's readings are called and how many there are: those of `read`, the rows of H, or the state variables.

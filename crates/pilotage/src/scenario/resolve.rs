@@ -6,7 +6,7 @@ use super::file::{
     ActionTable, ControlTable, EventTable, Kind, ModelFile, Plant, RewardTable, Rows, StartTable,
     StateTable, StepsTable, WorldMotionTable,
 };
-use super::file_value::{Ends, OneOrMany, Scalar, Sides, Where};
+use super::file_value::{Ends, OneOrMany, Sides, Where};
 use super::laws::{self, Writing, readings};
 use super::*;
 use crate::model::error::{Fault, Path};
@@ -45,7 +45,7 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
         solid: map.as_ref().map(Map::solid).unwrap_or_default(),
     };
     check_names(&names.state, &names.modes, &names.actions)?;
-    let motion = motion(&file)?;
+    let mut motion = motion(&file)?;
     let controls = motion.b.ncols();
     at_most(
         controls,
@@ -69,7 +69,19 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
         },
         motion: names.true_motion(&file.world.motion)?,
     };
-    let sensor = sensor(&file)?;
+    let mut sensor = sensor(&file)?;
+    let noise = |table: &str| Path::new(table).key("noise");
+    if let Some(noise) = laws::constant(&file.motion.noise, &writing, noise("motion"))? {
+        motion.noise = noise;
+    }
+    if let Some(noise) = laws::constant(&file.sensor.noise, &writing, noise("sensor"))? {
+        sensor.noise = noise;
+    }
+    if let Some(present) = &file.sensor.present {
+        let path = Path::new("sensor").key("present");
+        let present = writing.formula(present, path)?.constant();
+        sensor.present = present.unwrap_or(sensor.present);
+    }
     let mut state = state_variables(&file.state, map.as_ref())?;
     for (variable, kind) in state.iter_mut().zip(laws::kinds(&file.state, &names)?) {
         variable.kind = kind;
@@ -502,7 +514,7 @@ fn motion(file: &ModelFile) -> Result<Motion, Fault> {
             ));
         }
         let noise = match &table.noise {
-            Some(rows) => laws::numbers(rows, |_, _| 0.0, path("noise"))?,
+            Some(rows) => laws::numbers(rows, path("noise"))?,
             None => noise,
         };
         let drift = DVector::zeros(a.nrows());
@@ -544,7 +556,7 @@ fn motion(file: &ModelFile) -> Result<Motion, Fault> {
             .as_deref()
             .map_or_else(|| DVector::zeros(variables), DVector::from_column_slice),
         noise: match &table.noise {
-            Some(rows) => laws::numbers(rows, |_, _| 0.0, path("noise"))?,
+            Some(rows) => laws::numbers(rows, path("noise"))?,
             None if said => DMatrix::zeros(variables, variables),
             None => return Err(missing("noise")),
         },
@@ -589,7 +601,7 @@ fn sensor(file: &ModelFile) -> Result<Sensor, Fault> {
             _ => DMatrix::zeros(readings, variables),
         },
         noise: match &table.noise {
-            Some(rows) => laws::numbers(rows, |_, _| 0.0, path("noise"))?,
+            Some(rows) => laws::numbers(rows, path("noise"))?,
             None if table.symbols.is_some() => DMatrix::zeros(0, 0),
             None => {
                 return Err(Fault::new(
@@ -599,10 +611,7 @@ fn sensor(file: &ModelFile) -> Result<Sensor, Fault> {
                 ));
             }
         },
-        present: match &table.present {
-            Some(Scalar::Number(present)) => *present,
-            _ => 1.0,
-        },
+        present: 1.0,
     })
 }
 

@@ -1,0 +1,192 @@
+//! One Gaussian of a sum: what is cut off it, what moves it, how it is halved.
+
+use crate::belief::gaussian::{normal_cdf, normal_density};
+use crate::model::{Interval, ModeId, Region};
+
+/// A weighted Gaussian in a mode. Covariances may be singular: a point has none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Component {
+    /// Probability; those of a sum add up to 1.
+    pub weight: f64,
+    /// Mode.
+    pub mode: ModeId,
+    /// Mean, length `n`.
+    pub mean: Vec<f64>,
+    /// Covariance, row by row, `n x n`.
+    pub covariance: Vec<f64>,
+}
+
+/// Less likely parts are left out.
+const NOTHING: f64 = 1e-9;
+
+impl Component {
+    /// Number of state variables.
+    pub(super) fn dim(&self) -> usize {
+        self.mean.len()
+    }
+
+    pub(super) fn variance(&self, variable: usize) -> f64 {
+        self.covariance[variable * self.dim() + variable]
+    }
+
+    /// The parts of it inside and outside a region, each with the moments of what is cut off there. One side of the region is cut after the
+    /// other, what is left of other variables by regression.
+    pub(super) fn cut(self, region: &Region) -> (Option<Self>, Vec<Self>) {
+        let mut outside = Vec::new();
+        let mut inside = self;
+        for &(variable, side) in &region.sides {
+            let (within, beyond) = inside.cut_side(variable, side);
+            outside.extend(beyond);
+            match within {
+                Some(within) => inside = within,
+                None => return (None, outside),
+            }
+        }
+        (Some(inside), outside)
+    }
+
+    /// The parts inside and outside an interval of one variable.
+    pub(super) fn cut_side(self, variable: usize, side: Interval) -> (Option<Self>, Vec<Self>) {
+        if self.variance(variable) <= 0.0 {
+            return match side.contains(self.mean[variable]) {
+                true => (Some(self), Vec::new()),
+                false => (None, vec![self]),
+            };
+        }
+        let below = Interval::new(f64::NEG_INFINITY, side.low);
+        let above = Interval::new(side.high, f64::INFINITY);
+        let inside = self.within(variable, side);
+        let outside = [below, above].into_iter();
+        let outside = outside.filter_map(|part| self.within(variable, part)).collect();
+        (inside, outside)
+    }
+
+    /// What of it lies in an interval of a variable; `None` if hardly any does.
+    fn within(&self, variable: usize, side: Interval) -> Option<Self> {
+        if side.low >= side.high {
+            return None;
+        }
+        let variance = self.variance(variable);
+        let sd = variance.sqrt();
+        let low = (side.low - self.mean[variable]) / sd;
+        let high = (side.high - self.mean[variable]) / sd;
+        let mass = match low > 0.0 {
+            true => normal_cdf(-low) - normal_cdf(-high),
+            false => normal_cdf(high) - normal_cdf(low),
+        };
+        if mass <= NOTHING {
+            return None;
+        }
+        if mass >= 1.0 - NOTHING {
+            return Some(self.clone());
+        }
+        let density = |x: f64| if x.is_finite() { normal_density(x) } else { 0.0 };
+        let moment = |x: f64| if x.is_finite() { x * normal_density(x) } else { 0.0 };
+        let shift = (density(low) - density(high)) / mass;
+        let left = (1.0 + (moment(low) - moment(high)) / mass - shift * shift).clamp(0.0, 1.0);
+        let mut part = self.clone();
+        part.weight *= mass;
+        part.condition(variable, self.mean[variable] + sd * shift, left * variance);
+        part.mean[variable] = part.mean[variable].clamp(side.low, side.high);
+        Some(part)
+    }
+
+    /// Gives a variable another mean and variance, and the others what follows from that by regression.
+    pub(super) fn condition(&mut self, variable: usize, mean: f64, variance: f64) {
+        let n = self.dim();
+        let before = self.variance(variable);
+        if before <= 0.0 {
+            self.mean[variable] = mean;
+            return;
+        }
+        let gains: Vec<f64> = (0..n)
+            .map(|i| self.covariance[i * n + variable] / before)
+            .collect();
+        let (moved, more) = (mean - self.mean[variable], variance - before);
+        for i in 0..n {
+            self.mean[i] += gains[i] * moved;
+            for j in 0..n {
+                self.covariance[i * n + j] += gains[i] * gains[j] * more;
+            }
+        }
+        for i in 0..n {
+            self.covariance[i * n + i] = self.covariance[i * n + i].max(0.0);
+        }
+    }
+
+    /// What of it stays inside the bounds, and what has run against them: that sits at the bound.
+    pub(super) fn stopped(self, bounds: &[Interval]) -> Vec<Self> {
+        let mut parts = vec![self];
+        for (variable, side) in bounds.iter().enumerate() {
+            if side.low == f64::NEG_INFINITY && side.high == f64::INFINITY {
+                continue;
+            }
+            let before = std::mem::take(&mut parts);
+            for part in before {
+                let (inside, beyond) = part.cut_side(variable, *side);
+                parts.extend(inside);
+                for mut part in beyond {
+                    let at = side.clamp(part.mean[variable]);
+                    part.sit(variable, at);
+                    parts.push(part);
+                }
+            }
+        }
+        parts
+    }
+
+    /// Puts a variable to a value, whatever the others are.
+    fn sit(&mut self, variable: usize, at: f64) {
+        let n = self.dim();
+        self.mean[variable] = at;
+        for i in 0..n {
+            self.covariance[variable * n + i] = 0.0;
+            self.covariance[i * n + variable] = 0.0;
+        }
+    }
+
+    /// Three narrower ones with the same moments together, side by side along a variable and what goes with it.
+    pub(super) fn split(self, variable: usize) -> [Self; 3] {
+        // Of the standard normal: outer weights, distance of the outer means, and variance that is left.
+        const OUTER: f64 = 0.2252;
+        const APART: f64 = 1.0575;
+        let left = 1.0 - 2.0 * OUTER * APART * APART;
+        let variance = self.variance(variable);
+        let sd = variance.sqrt();
+        let at = |steps: f64, share: f64| {
+            let mut part = self.clone();
+            part.weight *= share;
+            part.condition(variable, self.mean[variable] + steps * APART * sd, left * variance);
+            part
+        };
+        [at(-1.0, OUTER), at(0.0, 1.0 - 2.0 * OUTER), at(1.0, OUTER)]
+    }
+}
+
+/// Lower triangular root of a covariance, row by row; 0 along directions without any variance.
+pub(super) fn root(covariance: &[f64], n: usize) -> Vec<f64> {
+    let mut root = vec![0.0; n * n];
+    let scale = (0..n).fold(0.0, |most: f64, i| most.max(covariance[i * n + i]));
+    for j in 0..n {
+        let before: f64 = (0..j).map(|k| root[j * n + k] * root[j * n + k]).sum();
+        let pivot = covariance[j * n + j] - before;
+        if pivot <= 1e-14 * scale || pivot <= 0.0 {
+            continue;
+        }
+        let pivot = pivot.sqrt();
+        root[j * n + j] = pivot;
+        for i in j + 1..n {
+            let shared: f64 = (0..j).map(|k| root[i * n + k] * root[j * n + k]).sum();
+            root[i * n + j] = (covariance[i * n + j] - shared) / pivot;
+        }
+    }
+    root
+}
+
+/// Writes `mean + root z`.
+pub(super) fn place(mean: &[f64], root: &[f64], z: &[f64], to: &mut [f64]) {
+    let n = mean.len();
+    for i in 0..n {
+        to[i] = mean[i] + (0..=i).map(|k| root[i * n + k] * z[k]).sum::<f64>();
+    }
+}

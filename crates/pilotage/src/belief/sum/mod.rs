@@ -1,0 +1,296 @@
+//! A belief that is a sum of weighted Gaussians, each in a mode: what is believed of hidden modes, at walls, and where noise depends on the
+//! place.
+//!
+//! One Gaussian a mode makes it the filter of interacting multiple models. More of them stand for what no Gaussian is: a start that is wide
+//! for its sensor is split, events and walls cut off what happens there. After every reading those most alike are merged, so that mean
+//! and covariance stay.
+
+mod act;
+mod component;
+mod quadrature;
+mod readings;
+mod reduce;
+mod sense;
+
+pub use component::Component;
+use quadrature::Rule;
+use reduce::{normalise, reduce};
+
+use super::full::{Acted, Keeping, Moments, Sensed};
+use super::reading::Reading;
+use crate::model::{
+    ActionId, Doing, Dynamics, EffectTable, Interval, ModeId, Model, StartShape, VariableKind,
+};
+
+/// A sum of Gaussians.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sum {
+    components: Vec<Component>,
+}
+
+impl Sum {
+    /// Its Gaussians.
+    pub fn components(&self) -> &[Component] {
+        &self.components
+    }
+}
+
+/// Keeps sums of Gaussians for a model.
+#[derive(Debug)]
+pub struct SumKeeping {
+    model: Model,
+    dynamics: Dynamics,
+    effects: EffectTable,
+    start: Sum,
+    most: usize,
+    /// Standard deviations that count as none, length `n`.
+    floors: Vec<f64>,
+    /// For expectations of smooth functions.
+    rule: Rule,
+    /// For posterior moments.
+    fine: Rule,
+    /// The box in which a state can be, where walls without a map are known.
+    bounds: Option<Vec<Interval>>,
+}
+
+/// A standard deviation so many times smaller than the start's, or than a tenth of the bounds, counts as none.
+const CERTAIN: f64 = 1e-4;
+
+/// Most points that a start of whole numbers becomes.
+const MOST_POINTS: usize = 400;
+
+/// Equal slices of a uniform start along a variable.
+const SLICES: usize = 8;
+
+impl SumKeeping {
+    /// Sums of Gaussians for a model, of as many as [`crate::model::BeliefSettings::components`] says: by itself 40 for one state variable,
+    /// 16 for more.
+    pub fn new(model: &Model) -> Self {
+        let n = model.state_dim();
+        let dynamics = Dynamics::new(model);
+        let floor = |i: usize| {
+            let starts = model.start.iter();
+            let widest = starts.map(|start| start.covariance[(i, i)].max(0.0).sqrt());
+            let width = model.state[i].bounds.width();
+            let width = if width.is_finite() { 0.1 * width } else { 0.0 };
+            CERTAIN * widest.fold(width, f64::max).max(f64::MIN_POSITIVE)
+        };
+        let walled = dynamics.walls().filter(|walls| walls.map.is_none());
+        let mut keeping = Self {
+            start: Sum {
+                components: Vec::new(),
+            },
+            most: model.belief.components.unwrap_or(if n == 1 { 40 } else { 16 }),
+            floors: (0..n).map(floor).collect(),
+            rule: Rule::new(n, if n == 1 { 9 } else { 5 }),
+            fine: Rule::new(n, if n == 1 { 15 } else { 7 }),
+            bounds: walled.map(|walls| walls.bounds.clone()),
+            effects: EffectTable::new(model, |effects| effects),
+            model: model.clone(),
+            dynamics,
+        };
+        keeping.start = keeping.first();
+        keeping
+    }
+
+    /// What is believed at the start, in several Gaussians where its shape asks for them.
+    fn first(&mut self) -> Sum {
+        let starts: Vec<(Component, StartShape)> = self
+            .model
+            .start
+            .iter()
+            .map(|start| {
+                let component = Component {
+                    weight: start.weight,
+                    mode: start.mode,
+                    mean: start.mean.as_slice().to_vec(),
+                    covariance: start.covariance.transpose().as_slice().to_vec(),
+                };
+                (component, start.shape)
+            })
+            .collect();
+        let mut components = Vec::new();
+        for (component, shape) in starts {
+            let whole = component.dim() == 1 && self.dynamics.kinds()[0] == VariableKind::Integer;
+            match (whole, shape) {
+                (true, shape) => components.extend(points(&component, shape)),
+                (false, StartShape::Uniform) => components.extend(slices(component)),
+                (false, StartShape::Normal) => match &self.bounds {
+                    Some(bounds) => components.extend(component.stopped(bounds)),
+                    None => components.push(component),
+                },
+            }
+        }
+        let alive = &self.model.episode.alive;
+        if !alive.sides.is_empty() {
+            let cut = |component: Component| component.cut(alive).0;
+            components = components.into_iter().filter_map(cut).collect();
+        }
+        normalise(&mut components);
+        self.most = match self.dynamics.kinds() {
+            [VariableKind::Integer] => self.most.max(components.len().min(MOST_POINTS)),
+            _ => self.most,
+        };
+        Sum { components }
+    }
+
+    fn doing(&self, mode: ModeId, action: ActionId, step: usize) -> Doing {
+        Doing { mode, action, step }
+    }
+}
+
+/// The whole numbers that a start may be, each a point.
+fn points(start: &Component, shape: StartShape) -> Vec<Component> {
+    let (mean, variance) = (start.mean[0], start.covariance[0].max(0.0));
+    let reach = match shape {
+        StartShape::Normal => 5.0 * variance.sqrt(),
+        StartShape::Uniform => (3.0 * variance).sqrt(),
+    };
+    let (low, high) = ((mean - reach).round() as i64, (mean + reach).round() as i64);
+    let stride = ((high - low) as usize / MOST_POINTS + 1) as i64;
+    let inside = |k: i64| -> f64 {
+        let half = 0.5 * stride as f64;
+        let side = Interval::new(k as f64 - half, k as f64 + half);
+        match shape {
+            StartShape::Normal => super::gaussian::interval_probability(mean, variance, side),
+            StartShape::Uniform => {
+                let within = side.high.min(mean + reach) - side.low.max(mean - reach);
+                within.max(0.0).max(if reach == 0.0 { 1.0 } else { 0.0 })
+            }
+        }
+    };
+    let numbers = (low..=high).step_by(stride as usize);
+    let points = numbers.map(|k| Component {
+        weight: inside(k),
+        mode: start.mode,
+        mean: vec![k as f64],
+        covariance: vec![0.0],
+    });
+    let mut points: Vec<Component> = points.filter(|point| point.weight > 0.0).collect();
+    normalise(&mut points);
+    for point in &mut points {
+        point.weight *= start.weight;
+    }
+    points
+}
+
+/// A uniform box in slices along its widest variables, with the moments of each.
+fn slices(start: Component) -> Vec<Component> {
+    let n = start.dim();
+    let each = if n == 1 { SLICES } else { 3 };
+    let sliced = n.min(2);
+    let mut widest: Vec<usize> = (0..n).collect();
+    widest.sort_by(|&a, &b| start.variance(b).total_cmp(&start.variance(a)));
+    let mut parts = vec![start];
+    for &variable in &widest[..sliced] {
+        let mut finer = Vec::new();
+        for part in parts {
+            let width = (12.0 * part.variance(variable)).sqrt();
+            for k in 0..each {
+                let mut slice = part.clone();
+                slice.weight /= each as f64;
+                let offset = (k as f64 + 0.5) / each as f64 - 0.5;
+                slice.mean[variable] += width * offset;
+                slice.covariance[variable * n + variable] /= (each * each) as f64;
+                finer.push(slice);
+            }
+        }
+        parts = finer;
+    }
+    parts
+}
+
+impl Keeping for SumKeeping {
+    type Full = Sum;
+
+    fn actions(&self) -> usize {
+        self.dynamics.actions()
+    }
+
+    fn start(&self) -> Sum {
+        self.start.clone()
+    }
+
+    fn act(&self, full: &mut Sum, action: ActionId, step: usize) -> Acted {
+        let acted = self.take(full, action, step);
+        reduce(&mut full.components, 2 * self.most, &self.floors);
+        acted
+    }
+
+    fn readings(
+        &self,
+        full: &Sum,
+        action: ActionId,
+        step: usize,
+        most: usize,
+    ) -> Vec<(f64, Sensed)> {
+        self.spread_readings(full, action, step, most)
+    }
+
+    fn sense(&self, full: &mut Sum, action: ActionId, step: usize, reading: Reading<'_>) {
+        self.correct(full, action, step, reading);
+        reduce(&mut full.components, self.most, &self.floors);
+    }
+
+    fn moments(&self, full: &Sum, moments: &mut Moments) {
+        let n = self.dynamics.states();
+        moments.mean.clear();
+        moments.mean.resize(n, 0.0);
+        moments.covariance.clear();
+        moments.covariance.resize(n * n, 0.0);
+        moments.weights.clear();
+        moments.weights.resize(self.dynamics.modes(), 0.0);
+        for component in &full.components {
+            moments.weights[component.mode] += component.weight;
+            for (mean, own) in moments.mean.iter_mut().zip(&component.mean) {
+                *mean += component.weight * own;
+            }
+        }
+        for component in &full.components {
+            for i in 0..n {
+                let apart = component.mean[i] - moments.mean[i];
+                for j in 0..n {
+                    let k = i * n + j;
+                    let spread =
+                        component.covariance[k] + apart * (component.mean[j] - moments.mean[j]);
+                    moments.covariance[k] += component.weight * spread;
+                }
+            }
+        }
+    }
+
+    fn with_moments(&self, moments: &Moments) -> Sum {
+        const UNLIKELY: f64 = 1e-6;
+        let modes = moments.weights.iter().enumerate();
+        let mut components: Vec<Component> = modes
+            .filter(|(_, weight)| **weight > UNLIKELY)
+            .map(|(mode, &weight)| Component {
+                weight,
+                mode,
+                mean: moments.mean.clone(),
+                covariance: moments.covariance.clone(),
+            })
+            .collect();
+        for component in &mut components {
+            self.dynamics.round_within(&mut component.mean);
+        }
+        normalise(&mut components);
+        Sum { components }
+    }
+
+    fn moved_to(&self, full: &Sum, mean: &[f64]) -> Sum {
+        let mut moments = Moments::default();
+        self.moments(full, &mut moments);
+        let mut moved = full.clone();
+        for component in &mut moved.components {
+            for ((value, to), from) in component.mean.iter_mut().zip(mean).zip(&moments.mean) {
+                *value += to - from;
+            }
+            if let Some(walls) = self.dynamics.walls() {
+                walls.confine(&mut component.mean);
+            }
+            self.dynamics.round_within(&mut component.mean);
+        }
+        moved
+    }
+}
