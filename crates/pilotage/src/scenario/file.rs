@@ -386,7 +386,7 @@ pub(super) struct BeliefTable {
     /// What keeps the belief. Default: what the model asks for.
     #[serde(default)]
     pub tracker: TrackerKind,
-    /// Most Gaussians of a sum. Default: 40 for one state variable, 16 for more.
+    /// Most Gaussians of a sum. Default: 16.
     pub components: Option<u64>,
     /// Cells along a variable. Default: 200 for one state variable, 40 for two.
     pub cells: Option<u64>,

@@ -29,6 +29,9 @@ const WIDTH: f64 = 1.5;
 /// Points of a grid that closes in.
 const POINTS: usize = 25;
 
+/// Points of the first grid, which has to find the posterior of a wide Gaussian.
+const FIRST: usize = 97;
+
 /// Times that it closes in at most.
 const ZOOMS: usize = 6;
 
@@ -71,7 +74,7 @@ impl SumKeeping {
             reading,
         };
         let mut parts = Vec::with_capacity(full.components.len());
-        let room = 3 * self.most;
+        let room = if self.splits { 3 * self.most } else { 0 };
         let many = full.components.len();
         for component in &full.components {
             if seen.is_some_and(|mode| mode != component.mode) {
@@ -294,30 +297,32 @@ impl SumKeeping {
         const FAR: f64 = 4.8;
         let (mean, sd) = (part.mean[0], part.variance(0).sqrt());
         let (mut low, mut high) = (-FAR, FAR);
-        let mut logs = [0.0; POINTS];
-        let step = |low: f64, high: f64| (high - low) / (POINTS - 1) as f64;
+        let mut logs = Vec::with_capacity(FIRST);
+        // A Gaussian over which the sensor changes little needs no search.
+        let mut points = if self.splits { POINTS } else { FIRST };
+        let step = |low: f64, high: f64, points: usize| (high - low) / (points - 1) as f64;
         for zoom in 0..ZOOMS {
-            let width = step(low, high);
-            let mut best = f64::NEG_INFINITY;
-            for (k, log) in logs.iter_mut().enumerate() {
+            let width = step(low, high, points);
+            logs.clear();
+            logs.extend((0..points).map(|k| {
                 let z = low + width * k as f64;
-                *log = self.log_likelihood(heard, &[mean + sd * z]) - 0.5 * z * z;
-                best = best.max(*log);
-            }
+                self.log_likelihood(heard, &[mean + sd * z]) - 0.5 * z * z
+            }));
+            let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             if !best.is_finite() {
                 return f64::NEG_INFINITY;
             }
             let counts = |log: &f64| *log > best - DEPTH;
             let first = logs.iter().position(counts).unwrap_or(0);
-            let last = logs.iter().rposition(counts).unwrap_or(POINTS - 1);
-            let (from, to) = (first.saturating_sub(1), (last + 1).min(POINTS - 1));
-            let closes = to - from <= POINTS / 2;
-            if !closes || zoom + 1 == ZOOMS {
+            let last = logs.iter().rposition(counts).unwrap_or(points - 1);
+            let (from, to) = (first.saturating_sub(1), (last + 1).min(points - 1));
+            if to - from > points / 2 || zoom + 1 == ZOOMS {
                 break;
             }
             (low, high) = (low + width * from as f64, low + width * to as f64);
+            points = POINTS;
         }
-        let width = step(low, high);
+        let width = step(low, high, points);
         let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
         for (k, log) in logs.iter().enumerate() {
