@@ -53,6 +53,7 @@ fn the_corridor() {
     let Scenario {
         model: corridor,
         truth,
+        ..
     } = scenario("corridor");
     assert_eq!(action_names(&corridor), ["EAST", "WEST", "STOP"]);
     assert_eq!(corridor.state[0].bounds, Interval::new(0.0, 4.0));
@@ -160,7 +161,9 @@ fn the_cart_and_pole_are_held_exactly_over_a_step() {
         ("cart-pole-noisy", 0.45, 0.15),
         ("cart-pole-noisy-sd", 0.45 * 0.45, 0.15 * 0.15),
     ] {
-        let Scenario { model: pole, truth } = scenario(name);
+        let Scenario {
+            model: pole, truth, ..
+        } = scenario(name);
         let mut eigenvalues: Vec<f64> = pole
             .motion
             .a
