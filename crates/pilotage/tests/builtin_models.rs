@@ -71,7 +71,12 @@ fn the_gallery_and_light_and_dark_have_rules_of_thumb() {
         let rule = rule.unwrap_or_else(|| panic!("{name} has none"));
         let start = &model.start[0];
         let mean = start.mean.as_slice();
-        let deviations: Vec<f64> = start.covariance.diagonal().iter().map(|v| v.sqrt()).collect();
+        let deviations: Vec<f64> = start
+            .covariance
+            .diagonal()
+            .iter()
+            .map(|v| v.sqrt())
+            .collect();
         let weights = vec![1.0 / model.modes.len() as f64; model.modes.len()];
         let action = rule.action(mean, &deviations, &weights, 0);
         assert!(action < model.actions.len(), "{name}");

@@ -104,7 +104,8 @@ mod tests {
         for (i, name) in known.iter().enumerate() {
             let rule = rule(&[(&format!("{name} == 7"), 1)], 0);
             let mut told = [0.0; 7];
-            let ask = |told: &[f64]| rule.action(&told[..2], &told[2..4], &told[4..6], told[6] as usize);
+            let ask =
+                |told: &[f64]| rule.action(&told[..2], &told[2..4], &told[4..6], told[6] as usize);
             assert_eq!(ask(&told), 0, "{name}");
             told[i] = 7.0;
             assert_eq!(ask(&told), 1, "{name}");

@@ -57,7 +57,9 @@ impl Component {
         let above = Interval::new(side.high, f64::INFINITY);
         let inside = self.within(variable, side);
         let outside = [below, above].into_iter();
-        let outside = outside.filter_map(|part| self.within(variable, part)).collect();
+        let outside = outside
+            .filter_map(|part| self.within(variable, part))
+            .collect();
         (inside, outside)
     }
 
@@ -80,8 +82,20 @@ impl Component {
         if mass >= 1.0 - NOTHING {
             return Some(self.clone());
         }
-        let density = |x: f64| if x.is_finite() { normal_density(x) } else { 0.0 };
-        let moment = |x: f64| if x.is_finite() { x * normal_density(x) } else { 0.0 };
+        let density = |x: f64| {
+            if x.is_finite() {
+                normal_density(x)
+            } else {
+                0.0
+            }
+        };
+        let moment = |x: f64| {
+            if x.is_finite() {
+                x * normal_density(x)
+            } else {
+                0.0
+            }
+        };
         let shift = (density(low) - density(high)) / mass;
         let left = (1.0 + (moment(low) - moment(high)) / mass - shift * shift).clamp(0.0, 1.0);
         let mut part = self.clone();
@@ -156,7 +170,11 @@ impl Component {
         let at = |steps: f64, share: f64| {
             let mut part = self.clone();
             part.weight *= share;
-            part.condition(variable, self.mean[variable] + steps * APART * sd, left * variance);
+            part.condition(
+                variable,
+                self.mean[variable] + steps * APART * sd,
+                left * variance,
+            );
             part
         };
         [at(-1.0, OUTER), at(0.0, 1.0 - 2.0 * OUTER), at(1.0, OUTER)]

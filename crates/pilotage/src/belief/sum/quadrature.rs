@@ -48,7 +48,10 @@ impl Rule {
 
     /// Nodes with their weights.
     pub(super) fn iter(&self) -> impl Iterator<Item = (&[f64], f64)> {
-        self.nodes.iter().map(Vec::as_slice).zip(self.weights.iter().copied())
+        self.nodes
+            .iter()
+            .map(Vec::as_slice)
+            .zip(self.weights.iter().copied())
     }
 }
 
@@ -65,5 +68,7 @@ fn hermite(points: usize) -> Vec<(f64, f64)> {
         .collect();
     rule.sort_by(|a, b| a.0.total_cmp(&b.0));
     let total: f64 = rule.iter().map(|(_, weight)| weight).sum();
-    rule.into_iter().map(|(x, weight)| (x, weight / total)).collect()
+    rule.into_iter()
+        .map(|(x, weight)| (x, weight / total))
+        .collect()
 }

@@ -23,7 +23,13 @@ impl SumKeeping {
     }
 
     /// Points of the sum one after the other, each with a point of the noise: states and noises follow a Halton sequence.
-    fn numbers(&self, full: &Sum, action: ActionId, step: usize, most: usize) -> Vec<(f64, Sensed)> {
+    fn numbers(
+        &self,
+        full: &Sum,
+        action: ActionId,
+        step: usize,
+        most: usize,
+    ) -> Vec<(f64, Sensed)> {
         let (n, m) = (self.dynamics.states(), self.dynamics.readings());
         let mut readings = Vec::with_capacity(most + 1);
         let (mut at, mut z) = (vec![0.0; n], vec![0.0; n + m]);
@@ -79,7 +85,13 @@ impl SumKeeping {
         readings
     }
 
-    fn signals(&self, full: &Sum, action: ActionId, step: usize, symbols: usize) -> Vec<(f64, Sensed)> {
+    fn signals(
+        &self,
+        full: &Sum,
+        action: ActionId,
+        step: usize,
+        symbols: usize,
+    ) -> Vec<(f64, Sensed)> {
         let n = self.dynamics.states();
         let mut sums = vec![0.0; symbols];
         let mut likely = vec![0.0; symbols];
@@ -127,8 +139,9 @@ pub(super) fn normal_quantile(p: f64) -> f64 {
     use crate::belief::gaussian::{normal_cdf, normal_density};
     let t = (-2.0 * p.min(1.0 - p).ln()).sqrt();
     // M. Abramowitz and I. Stegun, 26.2.23.
-    let tail = t - (2.515517 + t * (0.802853 + t * 0.010328))
-        / (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
+    let tail = t
+        - (2.515517 + t * (0.802853 + t * 0.010328))
+            / (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
     let mut x = if p < 0.5 { -tail } else { tail };
     for _ in 0..2 {
         x -= (normal_cdf(x) - p) / normal_density(x);

@@ -13,7 +13,9 @@ const ALIKE: f64 = 1e-5;
 /// What a merger costs is bounded by how much it raises the entropy (A. Runnalls, 2007).
 pub(super) fn reduce(components: &mut Vec<Component>, most: usize, floors: &[f64]) {
     normalise(components);
-    let heaviest = components.iter().fold(0.0, |most: f64, c| most.max(c.weight));
+    let heaviest = components
+        .iter()
+        .fold(0.0, |most: f64, c| most.max(c.weight));
     components.retain(|component| component.weight >= HOPELESS.min(heaviest));
     let n = floors.len();
     // Along a line, only neighbours can be most alike.
@@ -29,13 +31,19 @@ pub(super) fn reduce(components: &mut Vec<Component>, most: usize, floors: &[f64
             let sizes = (sizes[i], sizes[j]);
             (cost(&components[i], &components[j], sizes, floors), j)
         });
-        costs.fold((f64::INFINITY, i), |best, one| if one.0 < best.0 { one } else { best })
+        costs.fold(
+            (f64::INFINITY, i),
+            |best, one| if one.0 < best.0 { one } else { best },
+        )
     };
     let mut best: Vec<(f64, usize)> = (0..components.len())
         .map(|i| nearest(i, components, &sizes))
         .collect();
     while components.len() > 1 {
-        let least = (0..best.len()).fold(0, |least, i| if best[i].0 < best[least].0 { i } else { least });
+        let least = (0..best.len()).fold(
+            0,
+            |least, i| if best[i].0 < best[least].0 { i } else { least },
+        );
         let (cost, other) = best[least];
         if !cost.is_finite() || (components.len() <= most && cost >= ALIKE) {
             break;
@@ -78,7 +86,12 @@ pub(super) fn merge(one: &mut Component, other: &Component) {
         return;
     }
     let (a, b) = (one.weight / total, other.weight / total);
-    let apart: Vec<f64> = other.mean.iter().zip(&one.mean).map(|(x, y)| x - y).collect();
+    let apart: Vec<f64> = other
+        .mean
+        .iter()
+        .zip(&one.mean)
+        .map(|(x, y)| x - y)
+        .collect();
     for i in 0..n {
         for j in 0..n {
             let k = i * n + j;
@@ -119,7 +132,9 @@ fn size(component: &Component, floors: &[f64]) -> f64 {
     };
     match n {
         1 => at(0, 0).ln(),
-        2 => (at(0, 0) * at(1, 1) - at(0, 1) * at(1, 0)).max(f64::MIN_POSITIVE).ln(),
+        2 => (at(0, 0) * at(1, 1) - at(0, 1) * at(1, 0))
+            .max(f64::MIN_POSITIVE)
+            .ln(),
         _ => {
             let lifted: Vec<f64> = (0..n * n).map(|k| at(k / n, k % n)).collect();
             let root = root(&lifted, n);

@@ -60,7 +60,13 @@ struct Heard<'a> {
 
 impl SumKeeping {
     /// Takes in what was sensed. A reading that no Gaussian foretells leaves all as they are.
-    pub(super) fn correct(&self, full: &mut Sum, action: ActionId, step: usize, reading: Reading<'_>) {
+    pub(super) fn correct(
+        &self,
+        full: &mut Sum,
+        action: ActionId,
+        step: usize,
+        reading: Reading<'_>,
+    ) {
         let m = self.dynamics.readings();
         let (reading, seen) = match reading {
             Reading::Values(values) if self.model.laws.modes_seen => {
@@ -80,7 +86,13 @@ impl SumKeeping {
             if seen.is_some_and(|mode| mode != component.mode) {
                 continue;
             }
-            self.split_into(component.clone(), heard(component), 3, &mut parts, room.saturating_sub(many));
+            self.split_into(
+                component.clone(),
+                heard(component),
+                3,
+                &mut parts,
+                room.saturating_sub(many),
+            );
         }
         let mut logs = Vec::with_capacity(parts.len());
         for part in &mut parts {
@@ -153,16 +165,21 @@ impl SumKeeping {
             let sd = variance.sqrt();
             for (k, steps) in [-WIDTH, 0.0, WIDTH].into_iter().enumerate() {
                 let at: Vec<f64> = (0..n)
-                    .map(|i| component.mean[i] + steps * component.covariance[i * n + variable] / sd)
+                    .map(|i| {
+                        component.mean[i] + steps * component.covariance[i * n + variable] / sd
+                    })
                     .collect();
                 self.dynamics.observation(heard.doing, &at, &mut values[k]);
-                self.dynamics.observation_noise(heard.doing, &at, &mut noises[k]);
+                self.dynamics
+                    .observation_noise(heard.doing, &at, &mut noises[k]);
             }
             for r in 0..m {
                 let variances = [0, 1, 2].map(|k: usize| noises[k][r * m + r]);
-                let (low, high) = variances.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), v| {
-                    (low.min(*v), high.max(*v))
-                });
+                let (low, high) = variances
+                    .iter()
+                    .fold((f64::INFINITY, 0.0_f64), |(low, high), v| {
+                        (low.min(*v), high.max(*v))
+                    });
                 let span = values[2][r] - values[0][r];
                 let own = (SHARP * span * span).max(f64::MIN_POSITIVE);
                 // Noise that is far larger than what the Gaussian spreads in the reading does not matter, whatever it does.
@@ -230,7 +247,8 @@ impl SumKeeping {
                 z[i] = sign;
                 place(&part.mean, &root_, &z, &mut at);
                 self.dynamics.observation(heard.doing, &at, &mut here);
-                self.dynamics.observation_noise(heard.doing, &at, &mut noise);
+                self.dynamics
+                    .observation_noise(heard.doing, &at, &mut noise);
                 for (sum, value) in expected.iter_mut().zip(&here) {
                     *sum += share * value;
                 }
@@ -238,7 +256,12 @@ impl SumKeeping {
                     *sum += share * entry;
                 }
                 values.push(here.clone());
-                offsets.push(at.iter().zip(&part.mean).map(|(x, m)| x - m).collect::<Vec<f64>>());
+                offsets.push(
+                    at.iter()
+                        .zip(&part.mean)
+                        .map(|(x, m)| x - m)
+                        .collect::<Vec<f64>>(),
+                );
             }
         }
         let mut cross = vec![0.0; n * m];
@@ -417,7 +440,9 @@ impl SumKeeping {
                 let likely = likely.get(symbol as usize).copied().unwrap_or(0.0);
                 (present * likely).ln()
             }
-            Reading::Values(observed) => present.ln() + self.log_density(heard.doing, state, observed),
+            Reading::Values(observed) => {
+                present.ln() + self.log_density(heard.doing, state, observed)
+            }
         }
     }
 

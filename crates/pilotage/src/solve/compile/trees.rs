@@ -9,7 +9,8 @@ use crate::belief::{Belief, BeliefSpace};
 use crate::model::ActionId;
 use crate::parallel;
 use crate::policy::{
-    Automaton, AutomatonRunner, Branch, Feature, Matching, Node, Place, Policy, StratumFeatures, Test, Tree,
+    Automaton, AutomatonRunner, Branch, Feature, Matching, Node, Place, Policy, StratumFeatures,
+    Test, Tree,
 };
 use crate::progress::Silent;
 use crate::scenario::Scenario;
@@ -99,13 +100,9 @@ pub(super) fn grow(
             seed.wrapping_add(round as u64),
         );
         let discount = space.model().discount;
-        collected.add(
-            &runs,
-            policy,
-            actions,
-            discount,
-            |belief, i| strata[belief.stratum].value(features[i], belief),
-        );
+        collected.add(&runs, policy, actions, discount, |belief, i| {
+            strata[belief.stratum].value(features[i], belief)
+        });
         // What was collected so far is the return that episodes of all rounds lose together.
         let allowed = size.loss * value * (round + 1) as f64;
         let grown = Grown::new(&collected, actions, size.nodes, allowed);
@@ -138,12 +135,18 @@ fn smallest(
     let mut since = 0;
     for nodes in sizes(size.nodes) {
         let tree = of_size(nodes);
-        let grew = tried.last().is_none_or(|(_, last)| tree.nodes.len() > last.nodes.len());
+        let grew = tried
+            .last()
+            .is_none_or(|(_, last)| tree.nodes.len() > last.nodes.len());
         if grew {
             let runner = AutomatonRunner::new(&tree);
             let earned = evaluate(&assumed, &tree.updater, &runner, options, &Silent);
             let earned = earned.discounted.mean;
-            since = if earned > best + 0.1 * size.loss * best.abs() { 0 } else { since + 1 };
+            since = if earned > best + 0.1 * size.loss * best.abs() {
+                0
+            } else {
+                since + 1
+            };
             best = best.max(earned);
             tried.push((earned, tree));
         }
@@ -152,7 +155,10 @@ fn smallest(
         }
     }
     let enough = best - size.loss * best.abs();
-    let chosen = tried.iter().position(|(earned, _)| *earned >= enough).unwrap_or(0);
+    let chosen = tried
+        .iter()
+        .position(|(earned, _)| *earned >= enough)
+        .unwrap_or(0);
     tried.swap_remove(chosen).1
 }
 
