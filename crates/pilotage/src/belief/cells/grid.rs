@@ -97,10 +97,6 @@ impl Axis {
         self.low + index as f64 * self.width
     }
 
-    pub(super) fn high(&self) -> f64 {
-        self.edge(self.count as i64)
-    }
-
     /// The middle of a cell, which may lie beyond the grid.
     pub(super) fn middle(&self, index: i64) -> f64 {
         self.edge(index) + 0.5 * self.width
