@@ -8,15 +8,15 @@ use crate::model::{Model, suggest};
 
 /// Every solver of the library, the first that accepts a model being the one to try first.
 const BUILTIN: [Entry; 9] = [
-    Entry::planner::<CodebookPlanner>(
-        "codebook",
-        &[],
-        "value iteration on strata and means of beliefs of any kind",
-    ),
     Entry::planner::<ValueIteration>(
         "value-iteration",
         &["kbvi-closed"],
         "value iteration on uncertainty level and mean",
+    ),
+    Entry::planner::<CodebookPlanner>(
+        "codebook",
+        &[],
+        "value iteration on strata and means of beliefs of any kind",
     ),
     Entry::planner::<PolicySearch>(
         "policy-search",

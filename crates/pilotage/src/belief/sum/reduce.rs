@@ -115,6 +115,18 @@ fn cost(one: &Component, other: &Component, sizes: (f64, f64), floors: &[f64]) -
             let within = a * one.covariance[0] + b * other.covariance[0];
             (within + a * b * apart * apart + floors[0] * floors[0]).ln()
         }
+        2 => {
+            let (a, b) = (one.weight / total, other.weight / total);
+            let apart = [0, 1].map(|i: usize| one.mean[i] - other.mean[i]);
+            let entry = |i: usize, j: usize| {
+                let k = 2 * i + j;
+                let own = a * one.covariance[k] + b * other.covariance[k];
+                let floor = if i == j { floors[i] * floors[i] } else { 0.0 };
+                own + a * b * apart[i] * apart[j] + floor
+            };
+            let size = entry(0, 0) * entry(1, 1) - entry(0, 1) * entry(1, 0);
+            size.max(f64::MIN_POSITIVE).ln()
+        }
         _ => {
             let mut both = one.clone();
             merge(&mut both, other);
