@@ -13,11 +13,6 @@ const BUILTIN: [Entry; 9] = [
         &["kbvi-closed"],
         "value iteration on uncertainty level and mean",
     ),
-    Entry::planner::<CodebookPlanner>(
-        "codebook",
-        &[],
-        "value iteration on strata and means of beliefs of any kind",
-    ),
     Entry::planner::<PolicySearch>(
         "policy-search",
         &[],
@@ -39,6 +34,11 @@ const BUILTIN: [Entry; 9] = [
         "acts as if all uncertainty were gone after this step",
     ),
     Entry::planner::<Mls>("mls", &[], "acts as if the most likely state were certain"),
+    Entry::planner::<CodebookPlanner>(
+        "codebook",
+        &[],
+        "value iteration on strata and means of beliefs of any kind",
+    ),
     Entry::learner::<Kafaq>(
         "kafaq",
         &[],

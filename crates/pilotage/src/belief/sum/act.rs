@@ -252,8 +252,7 @@ impl SumKeeping {
             }
             return vec![moved];
         }
-        let whole = super::points(&moved, crate::model::StartShape::Normal);
-        whole
+        super::points(&moved, crate::model::StartShape::Normal)
     }
 
     fn moved_linearly(

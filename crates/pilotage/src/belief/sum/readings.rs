@@ -3,6 +3,7 @@
 use super::component::{place, root};
 use super::{Sum, SumKeeping};
 use crate::belief::full::Sensed;
+use crate::belief::gaussian::normal_quantile;
 use crate::model::ActionId;
 
 /// Bases of the Halton sequence, one for each number that is drawn.
@@ -132,19 +133,4 @@ fn halton(mut index: u64, base: u64) -> f64 {
         index /= base;
     }
     value
-}
-
-/// Quantile of the standard normal for a probability in `(0, 1)`, a rational guess and two steps of Newton.
-pub(super) fn normal_quantile(p: f64) -> f64 {
-    use crate::belief::gaussian::{normal_cdf, normal_density};
-    let t = (-2.0 * p.min(1.0 - p).ln()).sqrt();
-    // M. Abramowitz and I. Stegun, 26.2.23.
-    let tail = t
-        - (2.515517 + t * (0.802853 + t * 0.010328))
-            / (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
-    let mut x = if p < 0.5 { -tail } else { tail };
-    for _ in 0..2 {
-        x -= (normal_cdf(x) - p) / normal_density(x);
-    }
-    x
 }

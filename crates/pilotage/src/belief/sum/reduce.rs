@@ -53,15 +53,15 @@ pub(super) fn reduce(components: &mut Vec<Component>, most: usize, floors: &[f64
         best.remove(other);
         merge(&mut components[least], &taken);
         sizes[least] = size(&components[least], floors);
-        for i in 0..best.len() {
+        for (i, entry) in best.iter_mut().enumerate() {
             let stale = i == least
-                || best[i].1 == least
-                || best[i].1 == other
-                || (partners(i, components.len()).contains(&least) && !line);
-            if stale || (line && i + 1 == least) {
-                best[i] = nearest(i, components, &sizes);
-            } else if best[i].1 > other {
-                best[i].1 -= 1;
+                || entry.1 == least
+                || entry.1 == other
+                || partners(i, components.len()).contains(&least);
+            if stale {
+                *entry = nearest(i, components, &sizes);
+            } else if entry.1 > other {
+                entry.1 -= 1;
             }
         }
     }

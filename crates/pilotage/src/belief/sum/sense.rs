@@ -130,15 +130,15 @@ impl SumKeeping {
         room: usize,
     ) {
         const LIGHT: f64 = 1e-3;
-        if depth > 0 && component.weight > LIGHT && parts.len() + 3 <= room {
-            if let Some(bend) = self.bend(&component, heard)
-                && (bend.noise > OTHER_NOISE || bend.reading > BENT)
-            {
-                for part in component.split(bend.variable) {
-                    self.split_into(part, heard, depth - 1, parts, room);
-                }
-                return;
+        let fits = depth > 0 && component.weight > LIGHT && parts.len() + 3 <= room;
+        if fits
+            && let Some(bend) = self.bend(&component, heard)
+            && (bend.noise > OTHER_NOISE || bend.reading > BENT)
+        {
+            for part in component.split(bend.variable) {
+                self.split_into(part, heard, depth - 1, parts, room);
             }
+            return;
         }
         parts.push(component);
     }

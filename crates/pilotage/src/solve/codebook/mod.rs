@@ -42,9 +42,9 @@ const SOLVER: &str = "codebook";
 /// The planner on a codebook of strata.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CodebookPlanner {
-    /// Most strata; 1 to 1000.
+    /// Most strata; at least 1, at most 1000.
     pub strata: usize,
-    /// How far apart strata are at least, in units of the logarithm of a standard deviation; above 0.
+    /// How far apart strata are at least, in units of the logarithm of a standard deviation; more than 0.
     pub apart: f64,
     /// Points of the grid of means along each variable; at least 2, or `auto` for what suits the number of variables.
     pub points: Option<usize>,
@@ -52,11 +52,11 @@ pub struct CodebookPlanner {
     pub readings: usize,
     /// Times that the plan is refined on the beliefs that it meets; at least 1.
     pub rounds: usize,
-    /// Episodes that are run to meet beliefs in a round; 1 to a million.
+    /// Episodes that are run to meet beliefs in a round; at least 1, at most a million.
     pub episodes: usize,
-    /// Most beliefs in full that a round refines on.
+    /// Most beliefs in full that a round refines on; at least 0.
     pub refined: usize,
-    /// Largest change of a value in the last sweep, as a share of the largest value; above 0.
+    /// Largest change of a value in the last sweep, as a share of the largest value; more than 0.
     pub tolerance: f64,
 }
 
