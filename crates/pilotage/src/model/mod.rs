@@ -35,6 +35,7 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use barriers::Barriers;
 pub use builder::{Clause, ModelBuilder};
+pub(crate) use dynamics::wrapped;
 pub use dynamics::{Doing, Dynamics};
 pub(crate) use effects::EffectTable;
 pub use effects::{Change, Effect, Outcome, Switch, Tally, apart};

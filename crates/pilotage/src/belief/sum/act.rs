@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::component::{Component, place, root};
+use super::component::Component;
+use super::frame::{place, root};
 use super::reduce::normalise;
 use super::{Sum, SumKeeping};
 use crate::belief::full::Acted;
@@ -46,8 +47,7 @@ impl SumKeeping {
                         happened,
                     };
                     let goes_on = Then::Continue;
-                    let parts =
-                        self.happen(part, effects, When::After, goes_on, doing, &mut acted);
+                    let parts = self.happen(part, effects, When::After, goes_on, doing, &mut acted);
                     moved.extend(parts.into_iter().map(|part| part.component));
                 }
             }
@@ -82,7 +82,9 @@ impl SumKeeping {
         for effect in effects.iter().filter(|effect| effect.when == when) {
             let Some(change) = effect.change else {
                 let whole = left.iter().chain(&done);
-                acted.reward += whole.map(|part| self.paid(part, effect, doing)).sum::<f64>();
+                acted.reward += whole
+                    .map(|part| self.paid(part, effect, doing))
+                    .sum::<f64>();
                 continue;
             };
             for part in std::mem::take(&mut left) {
@@ -255,13 +257,24 @@ impl SumKeeping {
         whole
     }
 
-    fn moved_linearly(&self, component: &Component, a: &[f64], shift: &[f64], doing: Doing) -> Component {
+    fn moved_linearly(
+        &self,
+        component: &Component,
+        a: &[f64],
+        shift: &[f64],
+        doing: Doing,
+    ) -> Component {
         let n = component.dim();
         let mut moved = component.clone();
         let mut noise = vec![0.0; n * n];
         for i in 0..n {
             let row = &a[i * n..(i + 1) * n];
-            moved.mean[i] = shift[i] + row.iter().zip(&component.mean).map(|(a, m)| a * m).sum::<f64>();
+            moved.mean[i] = shift[i]
+                + row
+                    .iter()
+                    .zip(&component.mean)
+                    .map(|(a, m)| a * m)
+                    .sum::<f64>();
         }
         match self.dynamics.constant_transition_noise(doing) {
             Some(constant) => noise.copy_from_slice(constant),
@@ -376,7 +389,11 @@ impl Gathered {
         Component {
             weight,
             mode,
-            mean: mean.iter().zip(&self.first).map(|(mean, first)| mean + first).collect(),
+            mean: mean
+                .iter()
+                .zip(&self.first)
+                .map(|(mean, first)| mean + first)
+                .collect(),
             covariance,
         }
     }

@@ -57,7 +57,9 @@ impl Component {
         let above = Interval::new(side.high, f64::INFINITY);
         let inside = self.within(variable, side);
         let outside = [below, above].into_iter();
-        let outside = outside.filter_map(|part| self.within(variable, part)).collect();
+        let outside = outside
+            .filter_map(|part| self.within(variable, part))
+            .collect();
         (inside, outside)
     }
 
@@ -80,8 +82,20 @@ impl Component {
         if mass >= 1.0 - NOTHING {
             return Some(self.clone());
         }
-        let density = |x: f64| if x.is_finite() { normal_density(x) } else { 0.0 };
-        let moment = |x: f64| if x.is_finite() { x * normal_density(x) } else { 0.0 };
+        let density = |x: f64| {
+            if x.is_finite() {
+                normal_density(x)
+            } else {
+                0.0
+            }
+        };
+        let moment = |x: f64| {
+            if x.is_finite() {
+                x * normal_density(x)
+            } else {
+                0.0
+            }
+        };
         let shift = (density(low) - density(high)) / mass;
         let left = (1.0 + (moment(low) - moment(high)) / mass - shift * shift).clamp(0.0, 1.0);
         let mut part = self.clone();
@@ -156,37 +170,13 @@ impl Component {
         let at = |steps: f64, share: f64| {
             let mut part = self.clone();
             part.weight *= share;
-            part.condition(variable, self.mean[variable] + steps * APART * sd, left * variance);
+            part.condition(
+                variable,
+                self.mean[variable] + steps * APART * sd,
+                left * variance,
+            );
             part
         };
         [at(-1.0, OUTER), at(0.0, 1.0 - 2.0 * OUTER), at(1.0, OUTER)]
-    }
-}
-
-/// Lower triangular root of a covariance, row by row; 0 along directions without any variance.
-pub(super) fn root(covariance: &[f64], n: usize) -> Vec<f64> {
-    let mut root = vec![0.0; n * n];
-    let scale = (0..n).fold(0.0, |most: f64, i| most.max(covariance[i * n + i]));
-    for j in 0..n {
-        let before: f64 = (0..j).map(|k| root[j * n + k] * root[j * n + k]).sum();
-        let pivot = covariance[j * n + j] - before;
-        if pivot <= 1e-14 * scale || pivot <= 0.0 {
-            continue;
-        }
-        let pivot = pivot.sqrt();
-        root[j * n + j] = pivot;
-        for i in j + 1..n {
-            let shared: f64 = (0..j).map(|k| root[i * n + k] * root[j * n + k]).sum();
-            root[i * n + j] = (covariance[i * n + j] - shared) / pivot;
-        }
-    }
-    root
-}
-
-/// Writes `mean + root z`.
-pub(super) fn place(mean: &[f64], root: &[f64], z: &[f64], to: &mut [f64]) {
-    let n = mean.len();
-    for i in 0..n {
-        to[i] = mean[i] + (0..=i).map(|k| root[i * n + k] * z[k]).sum::<f64>();
     }
 }

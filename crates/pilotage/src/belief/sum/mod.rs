@@ -6,15 +6,23 @@
 //! and covariance stay.
 
 mod act;
+mod adapt;
+mod bend;
 mod component;
+mod frame;
+mod line;
 mod quadrature;
 mod readings;
 mod reduce;
+mod regression;
 mod sense;
+mod sensor;
+#[cfg(test)]
+mod tests;
 
 pub use component::Component;
 use quadrature::Rule;
-use reduce::{normalise, reduce};
+use reduce::{Likeness, normalise};
 
 use super::full::{Acted, Keeping, Moments, Sensed};
 use super::reading::Reading;
@@ -43,12 +51,13 @@ pub struct SumKeeping {
     effects: EffectTable,
     start: Sum,
     most: usize,
-    /// Standard deviations that count as none, length `n`.
-    floors: Vec<f64>,
+    likeness: Likeness,
     /// For expectations of smooth functions.
     rule: Rule,
-    /// For posterior moments.
+    /// For those that are less smooth.
     fine: Rule,
+    /// For posterior moments in 1, 2, ... coordinates.
+    posterior: Vec<Rule>,
     /// The box in which a state can be, where walls without a map are known.
     bounds: Option<Vec<Interval>>,
 }
@@ -80,10 +89,14 @@ impl SumKeeping {
             start: Sum {
                 components: Vec::new(),
             },
-            most: model.belief.components.unwrap_or(if n == 1 { 40 } else { 16 }),
-            floors: (0..n).map(floor).collect(),
+            most: model
+                .belief
+                .components
+                .unwrap_or(if n == 1 { 40 } else { 16 }),
+            likeness: Likeness::new((0..n).map(floor).collect(), dynamics.kinds()),
             rule: Rule::new(n, if n == 1 { 9 } else { 5 }),
             fine: Rule::new(n, if n == 1 { 15 } else { 7 }),
+            posterior: (1..=n).map(posterior_rule).collect(),
             bounds: walled.map(|walls| walls.bounds.clone()),
             effects: EffectTable::new(model, |effects| effects),
             model: model.clone(),
@@ -136,6 +149,17 @@ impl SumKeeping {
 
     fn doing(&self, mode: ModeId, action: ActionId, step: usize) -> Doing {
         Doing { mode, action, step }
+    }
+}
+
+/// The rule that finds posterior moments in so many coordinates.
+fn posterior_rule(r: usize) -> Rule {
+    match r {
+        1 => Rule::product(1, 9),
+        2 => Rule::product(2, 6),
+        3 => Rule::product(3, 4),
+        4 => Rule::product(4, 3),
+        _ => Rule::new(r, 0),
     }
 }
 
@@ -213,7 +237,7 @@ impl Keeping for SumKeeping {
 
     fn act(&self, full: &mut Sum, action: ActionId, step: usize) -> Acted {
         let acted = self.take(full, action, step);
-        reduce(&mut full.components, 2 * self.most, &self.floors);
+        self.likeness.reduce(&mut full.components, 2 * self.most);
         acted
     }
 
@@ -229,7 +253,7 @@ impl Keeping for SumKeeping {
 
     fn sense(&self, full: &mut Sum, action: ActionId, step: usize, reading: Reading<'_>) {
         self.correct(full, action, step, reading);
-        reduce(&mut full.components, self.most, &self.floors);
+        self.likeness.reduce(&mut full.components, self.most);
     }
 
     fn moments(&self, full: &Sum, moments: &mut Moments) {
@@ -240,19 +264,28 @@ impl Keeping for SumKeeping {
         moments.covariance.resize(n * n, 0.0);
         moments.weights.clear();
         moments.weights.resize(self.dynamics.modes(), 0.0);
+        let apart = |component: &Component, from: &[f64], i: usize| {
+            self.likeness.apart(i, from[i], component.mean[i])
+        };
+        // Angles are averaged around one of them.
+        let around = full.components.first().map_or(&[][..], |first| &first.mean);
         for component in &full.components {
             moments.weights[component.mode] += component.weight;
-            for (mean, own) in moments.mean.iter_mut().zip(&component.mean) {
-                *mean += component.weight * own;
+            for (i, mean) in moments.mean.iter_mut().enumerate() {
+                *mean += component.weight * apart(component, around, i);
             }
         }
+        for (mean, around) in moments.mean.iter_mut().zip(around) {
+            *mean += around;
+        }
+        self.dynamics.wrap(&mut moments.mean);
         for component in &full.components {
             for i in 0..n {
-                let apart = component.mean[i] - moments.mean[i];
+                let along = apart(component, &moments.mean, i);
                 for j in 0..n {
                     let k = i * n + j;
                     let spread =
-                        component.covariance[k] + apart * (component.mean[j] - moments.mean[j]);
+                        component.covariance[k] + along * apart(component, &moments.mean, j);
                     moments.covariance[k] += component.weight * spread;
                 }
             }
