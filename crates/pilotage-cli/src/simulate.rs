@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn wake_up(
     arguments: &Arguments,
-    Scenario { model, truth }: &Scenario,
+    Scenario { model, truth, .. }: &Scenario,
     automaton: &Automaton,
     bars: &Bars,
 ) -> Result<(), Failure> {

@@ -463,6 +463,7 @@ fn report(
         "samples": solution.samples,
         "evaluation_assumed": earned.assumed,
         "evaluation": earned.world,
+        "rule_of_thumb": earned.rule,
         "upper_bound": serde_json::Value::Null,
         "remarks": earned.remarks,
         "seconds": { "solve": solve, "evaluate": evaluate },

@@ -39,8 +39,12 @@ pub fn evaluation(evaluation: &Evaluation, planned: Option<f64>) -> String {
 
 /// What a solution earns: as planned, where its model holds, and in the world; one line where the last two are the same thing.
 pub fn earned(earned: &Earned, planned: Option<f64>, as_assumed: bool) -> String {
+    let rule = earned.rule.as_ref().map_or(String::new(), |rule| {
+        let rule = estimate(&rule.discounted);
+        format!("  rule of thumb        {rule}, the one in the model file\n")
+    });
     if as_assumed {
-        return evaluation(&earned.world, planned);
+        return evaluation(&earned.world, planned) + &rule;
     }
     let mut text = planned_line(planned);
     let _ = writeln!(
@@ -53,7 +57,7 @@ pub fn earned(earned: &Earned, planned: Option<f64>, as_assumed: bool) -> String
         "                       {} in the world",
         estimate(&earned.world.discounted)
     );
-    text + &rest(&earned.world)
+    text + &rest(&earned.world) + &rule
 }
 
 /// The most that any policy can earn, and how far what is earned where the model holds lies below it.

@@ -34,6 +34,7 @@ pub fn record(
     let mut scenario = Scenario {
         model: space.model().clone(),
         truth: truth.clone(),
+        rule: None,
     };
     let model = space.model();
     if model.state_dim() > 2 {

@@ -87,13 +87,18 @@ fn controls_told(scenario: &Scenario) -> Scenario {
     let Scenario {
         model: mut told,
         mut truth,
+        rule,
     } = scenario.clone();
     if let Some(noise) = truth.motion.noise.take() {
         told.motion.noise = noise;
     }
     truth.motion.controls.clear();
     let [forward, turn] = told.actions.as_slice() else {
-        return Scenario { model: told, truth };
+        return Scenario {
+            model: told,
+            truth,
+            rule,
+        };
     };
     let (mut east, mut west, turn) = (forward.clone(), forward.clone(), turn.clone());
     (east.name, east.control[0]) = ("EAST".to_owned(), 1.0);
@@ -110,7 +115,11 @@ fn controls_told(scenario: &Scenario) -> Scenario {
         forbidden.actions = Some(vec![if name.starts_with("east") { 2 } else { 0 }]);
         told.rewards.push(forbidden.clone());
     }
-    Scenario { model: told, truth }
+    Scenario {
+        model: told,
+        truth,
+        rule,
+    }
 }
 
 /// A policy that is shown the true mode at every step.

@@ -16,6 +16,7 @@ fn still(name: &str, at: &[f64], mode: usize) -> Scenario {
     let Scenario {
         mut model,
         mut truth,
+        rule,
     } = scenario(name);
     model.motion.noise *= 0.0;
     model.sensor.noise *= 0.0;
@@ -27,7 +28,7 @@ fn still(name: &str, at: &[f64], mode: usize) -> Scenario {
     start[0].covariance *= 0.0;
     start[0].mode = mode;
     truth.start = Some(start);
-    Scenario { model, truth }
+    Scenario { model, truth, rule }
 }
 
 /// Reward, state and mode afterwards of a plan's steps.
@@ -156,7 +157,9 @@ fn a_uniform_start_fills_its_box_and_is_believed_by_its_moments() {
 /// The planner's expected reward and chances are what the world does, on average over the belief, where no wall is near.
 #[test]
 fn expected_rewards_after_the_move_are_averages_of_the_world() {
-    let Scenario { mut model, truth } = scenario("cart-load-unload");
+    let Scenario {
+        mut model, truth, ..
+    } = scenario("cart-load-unload");
     model.state[0].bounds = Interval::new(-50.0, 50.0);
     let mdp = BeliefMdp::new(&model);
     let level = mdp.levels().steady(mdp.start().stratum, 0).unwrap();
@@ -172,6 +175,7 @@ fn expected_rewards_after_the_move_are_averages_of_the_world() {
                 start: Some(start),
                 ..truth.clone()
             },
+            rule: None,
         };
         let mut world = ProblemWorld::new(&there);
         let (mut paid, mut switched) = (0.0, 0.0);

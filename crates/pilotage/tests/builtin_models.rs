@@ -30,22 +30,65 @@ fn every_built_in_model_reads_under_its_own_name() {
 
 #[test]
 fn every_model_file_of_the_workspace_is_built_in() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/models");
-    let mut files: Vec<String> = std::fs::read_dir(folder)
-        .unwrap()
-        .filter_map(|entry| {
-            entry
-                .unwrap()
-                .file_name()
-                .to_str()?
-                .strip_suffix(".toml")
-                .map(str::to_owned)
-        })
-        .collect();
-    files.sort();
+    let files = |folder: &str| {
+        let folder = format!("{}/models/{folder}", env!("CARGO_MANIFEST_DIR"));
+        let mut files: Vec<String> = std::fs::read_dir(folder)
+            .unwrap()
+            .filter_map(|entry| {
+                entry
+                    .unwrap()
+                    .file_name()
+                    .to_str()?
+                    .strip_suffix(".toml")
+                    .map(str::to_owned)
+            })
+            .collect();
+        files.sort();
+        files
+    };
+    let mut gallery: Vec<&str> = scenario::gallery_names().collect();
     let mut names: Vec<&str> = scenario::names().collect();
+    assert!(names.ends_with(&gallery));
+    names.truncate(names.len() - gallery.len());
     names.sort();
-    assert_eq!(files, names);
+    gallery.sort();
+    assert_eq!(files(""), names);
+    assert_eq!(files("gallery"), gallery);
+}
+
+#[test]
+fn the_gallery_and_light_and_dark_have_rules_of_thumb() {
+    let dark = [
+        "light-dark-5",
+        "light-dark-10",
+        "light-dark-simple",
+        "light-dark-2d",
+        "beacons-2d",
+        "light-dark-binary",
+    ];
+    for name in scenario::gallery_names().chain(dark) {
+        let Scenario { model, rule, .. } = scenario(name);
+        let rule = rule.unwrap_or_else(|| panic!("{name} has none"));
+        let start = &model.start[0];
+        let mean = start.mean.as_slice();
+        let deviations: Vec<f64> = start
+            .covariance
+            .diagonal()
+            .iter()
+            .map(|v| v.sqrt())
+            .collect();
+        let weights = vec![1.0 / model.modes.len() as f64; model.modes.len()];
+        let action = rule.action(mean, &deviations, &weights, 0);
+        assert!(action < model.actions.len(), "{name}");
+        assert!(model.discount < 1.0, "{name}");
+    }
+    assert_eq!(scenario("corridor").rule, None);
+    let fingerprint = model("thermostat").fingerprint();
+    let text = scenario::builtin("thermostat").unwrap();
+    let other = text.replacen("20.5", "19.5", 1);
+    let other = scenario::read(&other, "thermostat").unwrap();
+    assert_ne!(other.rule, scenario("thermostat").rule);
+    assert_eq!(other.model.fingerprint(), fingerprint);
 }
 
 #[test]
@@ -53,6 +96,7 @@ fn the_corridor() {
     let Scenario {
         model: corridor,
         truth,
+        ..
     } = scenario("corridor");
     assert_eq!(action_names(&corridor), ["EAST", "WEST", "STOP"]);
     assert_eq!(corridor.state[0].bounds, Interval::new(0.0, 4.0));
@@ -160,7 +204,9 @@ fn the_cart_and_pole_are_held_exactly_over_a_step() {
         ("cart-pole-noisy", 0.45, 0.15),
         ("cart-pole-noisy-sd", 0.45 * 0.45, 0.15 * 0.15),
     ] {
-        let Scenario { model: pole, truth } = scenario(name);
+        let Scenario {
+            model: pole, truth, ..
+        } = scenario(name);
         let mut eigenvalues: Vec<f64> = pole
             .motion
             .a

@@ -43,7 +43,7 @@ fn keys_of_schema(schema: &Value, keys: &mut Vec<String>) {
     }
 }
 
-/// All keys of a file, without those that it chooses itself: names of actions and of state variables.
+/// All keys of a file, without those that it chooses itself: names of actions, state variables, readings and signals.
 fn keys_of_file(table: &toml::Table, keys: &mut Vec<String>) {
     for (key, value) in table {
         keys.push(key.clone());
@@ -54,7 +54,7 @@ fn keys_of_file(table: &toml::Table, keys: &mut Vec<String>) {
                     .filter_map(toml::Value::as_table)
                     .for_each(|action| keys_of_file(action, keys));
             }
-            ("in" | "alive" | "uniform", _) => {}
+            ("in" | "alive" | "uniform" | "step" | "read" | "symbols", _) => {}
             (_, toml::Value::Table(table)) => keys_of_file(table, keys),
             (_, toml::Value::Array(list)) => {
                 list.iter()
@@ -106,7 +106,7 @@ fn the_schema_knows_every_key_that_the_reader_knows() {
     let text = "format = 1\nzzzzzzzzzzzzzzzz = 1";
     let error = scenario::read(text, "x.toml").map(|_| ()).unwrap_err();
     let known: Vec<&str> = error.hint.split('`').skip(1).step_by(2).collect();
-    assert_eq!(known.len(), 17, "{known:?}");
+    assert_eq!(known.len(), 19, "{known:?}");
     assert!(
         known.iter().all(|key| keys.iter().any(|k| k == key)),
         "{known:?}"

@@ -53,6 +53,15 @@ pub trait Keeping: Send + Sync {
     /// A belief in full.
     type Full: Clone + Send + Sync;
 
+    /// The same way of keeping beliefs, as coarse as the moments of a belief allow: what becomes of beliefs that are known by their moments
+    /// alone is found faster by it. `None` where it is as fast already.
+    fn coarse(&self) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+
     /// Number of actions.
     fn actions(&self) -> usize;
 

@@ -30,6 +30,7 @@ mod sum;
 mod tracker;
 mod updater;
 
+pub(crate) use cells::Heard;
 pub use cells::{Cells, CellsKeeping};
 pub use codebook::{Codebook, Stratum};
 pub(crate) use filter::is_kept;

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use super::codebook::Codebook;
 use super::full::{Keeping, Moments};
-use super::{Belief, BeliefSpace, CellsKeeping, Filter, Reading, SumKeeping, Tracker, Tracking};
+use super::{
+    Belief, BeliefMdp, BeliefSpace, CellsKeeping, CodedSpace, Filter, Reading, SumKeeping, Tracker,
+    Tracking,
+};
 use crate::error::Result;
 use crate::model::{ActionId, Model, ModelText, TrackerKind};
 
@@ -167,6 +170,14 @@ impl Updater {
             Self::Linear(_) => None,
             Self::Sum(coded) => Some(coded.codebook()),
             Self::Cells(coded) => Some(coded.codebook()),
+        }
+    }
+
+    /// The beliefs of the model that it was made for, as it reads them.
+    pub fn space(&self, model: &Model) -> Box<dyn BeliefSpace> {
+        match self.codebook() {
+            Some(codebook) => Box::new(CodedSpace::new(model, self.clone(), codebook)),
+            None => Box::new(BeliefMdp::new(model)),
         }
     }
 

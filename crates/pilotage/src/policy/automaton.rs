@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::belief::{Belief, BeliefMdp, BeliefSpace, CodedSpace, StratumId, Updater};
+use crate::belief::{Belief, BeliefSpace, StratumId, Updater};
 use crate::model::{ActionId, Fingerprint, ModeId, Model};
 use crate::policy::{Coordinates, Policy, StratumFeatures, Tree};
 
@@ -231,10 +231,7 @@ impl Automaton {
 
     /// The beliefs of the model that it was made for, as it reads them.
     pub fn space(&self, model: &Model) -> Box<dyn BeliefSpace> {
-        match self.updater.codebook() {
-            Some(codebook) => Box::new(CodedSpace::new(model, self.updater.clone(), codebook)),
-            None => Box::new(BeliefMdp::new(model)),
-        }
+        self.updater.space(model)
     }
 
     /// The node of a belief; `None` only without nodes.

@@ -14,13 +14,14 @@ const LONGEST: usize = 255;
 const MOST_FILES: usize = 1_000;
 
 macro_rules! models {
-    ($($name:literal),* $(,)?) => {
-        &[$(($name, include_str!(concat!("../../models/", $name, ".toml")))),*]
+    (in $folder:literal: $($name:literal),* $(,)?) => {
+        &[$(($name, include_str!(concat!("../../models/", $folder, $name, ".toml")))),*]
     };
 }
 
-/// Name and text of every built-in model.
+/// Name and text of the built-in models, without those of the gallery.
 const MODELS: &[(&str, &str)] = models![
+    in "":
     "corridor",
     "corridor-unbounded",
     "corridor-walls",
@@ -46,19 +47,49 @@ const MODELS: &[(&str, &str)] = models![
     "robot-basic",
     "robot-maze-4x4",
     "robot-cart-load-unload",
+    "light-dark-5",
+    "light-dark-10",
+    "light-dark-simple",
+    "light-dark-2d",
+    "beacons-2d",
+    "light-dark-binary",
 ];
 
-/// Names of the built-in models.
+/// Those of the gallery: problems that people have, each with a rule of thumb.
+const GALLERY: &[(&str, &str)] = models![
+    in "gallery/":
+    "thermostat",
+    "wear",
+    "stock",
+    "dock",
+    "lane",
+    "height",
+    "rooms",
+    "unicycle",
+    "dosing",
+];
+
+/// All of them, those of the gallery last.
+fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
+    MODELS.iter().chain(GALLERY).copied()
+}
+
+/// Names of the built-in models, those of the gallery last.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    MODELS.iter().map(|&(name, _)| name)
+    all().map(|(name, _)| name)
+}
+
+/// Names of those of the built-in models that are the gallery: problems that people have, each with a [rule of
+/// thumb](super::Scenario::rule).
+pub fn gallery_names() -> impl Iterator<Item = &'static str> {
+    GALLERY.iter().map(|&(name, _)| name)
 }
 
 /// Text of the built-in model of that name.
 pub fn builtin(name: &str) -> Option<&'static str> {
-    MODELS
-        .iter()
-        .find(|&&(known, _)| known == name)
-        .map(|&(_, text)| text)
+    all()
+        .find(|(known, _)| *known == name)
+        .map(|(_, text)| text)
 }
 
 /// Reads the built-in model of that name, or else the model file at that path.

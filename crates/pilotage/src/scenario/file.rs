@@ -77,6 +77,22 @@ pub(super) struct ModelFile {
     /// What is true, where it differs from what the agent assumes.
     #[serde(default)]
     pub world: WorldTable,
+    /// A rule of thumb to compare plans with, which no planner sees: the first whose condition holds says what is done. The last has
+    /// no condition. Default: there is no such rule.
+    #[serde(default)]
+    pub rule: Vec<RuleTable>,
+}
+
+/// One line of a rule of thumb.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table")]
+pub(super) struct RuleTable {
+    /// Condition: an expression that knows the means of the state variables by name, their standard deviations `sd_NAME`, the
+    /// probabilities of the modes `p_MODE`, and the step `t`, counted from 0: `"sd_x > 0.5 and x < 4"`. Default: always.
+    pub when: Option<String>,
+    /// The action that is then taken.
+    #[serde(rename = "do")]
+    pub action: String,
 }
 
 /// The state variables.
@@ -386,7 +402,7 @@ pub(super) struct BeliefTable {
     /// What keeps the belief. Default: what the model asks for.
     #[serde(default)]
     pub tracker: TrackerKind,
-    /// Most Gaussians of a sum. Default: 40 for one state variable, 16 for more.
+    /// Most Gaussians of a sum. Default: 16.
     pub components: Option<u64>,
     /// Cells along a variable. Default: 200 for one state variable, 40 for two.
     pub cells: Option<u64>,

@@ -134,7 +134,8 @@ impl Writing {
         let mut found = vec![None; known.len()];
         let mut rests = 0;
         // The rest is written with the others, which are looked at first.
-        let (others, last): (Vec<_>, Vec<_>) = table.0.iter().partition(|(_, scalar)| !is_rest(scalar));
+        let (others, last): (Vec<_>, Vec<_>) =
+            table.0.iter().partition(|(_, scalar)| !is_rest(scalar));
         for (name, scalar) in others.into_iter().chain(last) {
             let path = path.clone().key(name);
             let signal = known

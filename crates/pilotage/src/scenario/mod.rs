@@ -4,6 +4,8 @@
 //! or made of a [`Model`] and a [`Truth`]; [`Scenario::assumed`] is the one in which a model holds. Planners and compilers are handed
 //! the model alone, so that nothing of the truth can reach them; worlds are made of the whole.
 //!
+//! A file may also hold a [rule of thumb](HandRule) that plans are compared with.
+//!
 //! [`schema`] describes the files. What a [`Truth`] may say: another start, other noise and controls ([`TrueMotion`]), [`Walls`], or a
 //! [`Simulator`] with laws of its own.
 
@@ -17,6 +19,7 @@ mod locate;
 mod read;
 mod resolve;
 mod robot;
+mod rule;
 mod validate;
 
 use nalgebra::{DMatrix, DVector};
@@ -25,10 +28,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::{ActionId, ModeId, Model, StartHypothesis, WallBelief, applies};
 
-pub use builtin::{builtin, find, names};
+pub use builtin::{builtin, find, gallery_names, names};
 pub use file::schema;
 pub use read::{load, read};
 pub use robot::Robot;
+pub use rule::{HandRule, RuleClause};
 
 /// What an agent assumes about its world, and what is true.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +41,8 @@ pub struct Scenario {
     pub model: Model,
     /// What is true where it differs.
     pub truth: Truth,
+    /// What somebody who knows the problem would do, to compare plans with; no planner sees it.
+    pub rule: Option<HandRule>,
 }
 
 impl Scenario {
@@ -52,12 +58,13 @@ impl Scenario {
                 ..Truth::default()
             },
             model: model.clone(),
+            rule: None,
         }
     }
 
     /// Whether the world is the one that the model assumes.
     pub fn is_as_assumed(&self) -> bool {
-        *self == Self::assumed(&self.model)
+        self.truth == Self::assumed(&self.model).truth
     }
 
     /// The true start.

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::file::{
-    ActionTable, ControlTable, EventTable, Kind, ModelFile, Plant, RewardTable, Rows, StartTable,
-    StateTable, StepsTable, WorldMotionTable,
+    ActionTable, ControlTable, EventTable, Kind, ModelFile, Plant, RewardTable, Rows, RuleTable,
+    StartTable, StateTable, StepsTable, WorldMotionTable,
 };
 use super::file_value::{Ends, OneOrMany, Sides, Where};
 use super::laws::{self, Writing, readings};
@@ -82,6 +82,7 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
         let present = writing.formula(present, path)?.constant();
         sensor.present = present.unwrap_or(sensor.present);
     }
+    let rule = names.rule(&file.rule)?;
     let mut state = state_variables(&file.state, map.as_ref())?;
     for (variable, kind) in state.iter_mut().zip(laws::kinds(&file.state, &names)?) {
         variable.kind = kind;
@@ -111,7 +112,7 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
         about: file.about,
         discount: file.discount,
     };
-    let scenario = Scenario { model, truth };
+    let scenario = Scenario { model, truth, rule };
     scenario.validate().map_err(|mut fault| {
         fault.path.renumber("reward", &reward_lines);
         fault.path.renumber("event", &event_lines);
@@ -360,6 +361,46 @@ impl Names {
             )),
             shape: StartShape::Uniform,
         })
+    }
+
+    fn rule(&self, tables: &[RuleTable]) -> Result<Option<HandRule>, Fault> {
+        let Some((last, first)) = tables.split_last() else {
+            return Ok(None);
+        };
+        let modes = self.modes.iter().filter(|mode| !mode.is_empty());
+        let known = HandRule::names(
+            self.state.iter().map(String::as_str),
+            modes.map(String::as_str),
+        );
+        let path = |i| Path::new("rule").index(i);
+        let action = |i, table: &RuleTable| {
+            index_of(&self.actions, "action", &table.action, path(i).key("do"))
+        };
+        if last.when.is_some() {
+            return Err(Fault::of_key(
+                path(first.len()).key("when"),
+                "where none of the conditions holds, nothing is said of what to do",
+                "end with a [[rule]] without `when`",
+            ));
+        }
+        let clause = |(i, table): (usize, &RuleTable)| {
+            let Some(when) = &table.when else {
+                return Err(Fault::new(
+                    path(i),
+                    "this always holds, so that those after it are never asked",
+                    "give it a condition `when`, or delete those after it",
+                ));
+            };
+            Ok(RuleClause {
+                when: rule::condition(when, &known, path(i).key("when"))?,
+                action: action(i, table)?,
+            })
+        };
+        let clauses = first.iter().enumerate().map(clause);
+        Ok(Some(HandRule::new(
+            clauses.collect::<Result<_, _>>()?,
+            action(first.len(), last)?,
+        )))
     }
 
     fn true_motion(&self, table: &Option<WorldMotionTable>) -> Result<TrueMotion, Fault> {

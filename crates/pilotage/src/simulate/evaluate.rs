@@ -105,6 +105,16 @@ pub fn evaluate(
     })
 }
 
+/// Runs agents in the scenario's world, each made anew for a number of episodes. The same numbers for any number of threads.
+pub fn evaluate_agent<'a>(
+    scenario: &'a Scenario,
+    agent: &(dyn Fn() -> Box<dyn Agent + 'a> + Sync),
+    options: Options,
+    observer: &dyn Progress,
+) -> Evaluation {
+    summarise(options, observer, &|| episodes(scenario, agent(), options))
+}
+
 /// Discounted return of `first` less that of `second` in the same worlds with the same noise, a paired comparison.
 pub fn compare(
     scenario: &Scenario,

@@ -10,13 +10,15 @@
 mod agent;
 mod estimate;
 mod evaluate;
+mod hand;
 mod life;
 pub mod wake_up;
 
 pub use agent::{Agent, TrackingAgent};
 pub use estimate::Estimate;
 pub(crate) use evaluate::summarise;
-pub use evaluate::{Difference, Evaluation, Lost, Options, compare, evaluate};
+pub use evaluate::{Difference, Evaluation, Lost, Options, compare, evaluate, evaluate_agent};
+pub use hand::{HandAgent, Told};
 pub use life::{Life, LifeOptions, Run, life};
 
 use crate::belief::{Reading, is_kept};

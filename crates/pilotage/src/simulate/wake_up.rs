@@ -274,6 +274,7 @@ pub fn measure(
             start: None,
             ..truth.clone()
         },
+        rule: None,
     };
     let mut tally = Tally::default();
     let runner = || {

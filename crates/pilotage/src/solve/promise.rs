@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::model::{HypothesisBelief, Model, WallBelief};
 use crate::progress::Progress;
 use crate::scenario::{Scenario, Walls};
-use crate::simulate::{Evaluation, Options};
+use crate::simulate::{Agent, Evaluation, HandAgent, Options, Told, evaluate_agent};
 
 /// What a solution earns, beside its promise ([`Solution::planned_value`]). All are returns over an episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +15,8 @@ pub struct Earned {
     pub assumed: Evaluation,
     /// In the scenario's world; the same where that is the one assumed.
     pub world: Evaluation,
+    /// What the scenario's rule of thumb earns in its world on the same beliefs, where it has one.
+    pub rule: Option<Evaluation>,
     /// What is to be known of the difference, and of the plan.
     pub remarks: Vec<String>,
 }
@@ -72,15 +74,46 @@ impl Solution {
         {
             remarks.push("the world has walls, and the belief does not know of them: the plan expects another return than is earned; write `walls = \"clip\"` in [belief]".to_owned());
         }
+        let rule = self.by_rule(scenario, options, observer);
+        if let Some(rule) = &rule {
+            let (ours, theirs) = (&world.discounted, &rule.discounted);
+            if theirs.mean - ours.mean > 3.0 * theirs.stderr.hypot(ours.stderr) {
+                remarks.push(format!(
+                    "the rule of thumb in the model file earns more, {:.4} ± {:.4}",
+                    theirs.mean, theirs.stderr
+                ));
+            }
+        }
         Ok(Earned {
             assumed,
             world,
+            rule,
             remarks,
         })
     }
 }
 
 impl Solution {
+    /// What the scenario's rule of thumb earns on beliefs that are kept as those of this solution.
+    fn by_rule(
+        &self,
+        scenario: &Scenario,
+        options: Options,
+        observer: &dyn Progress,
+    ) -> Option<Evaluation> {
+        let rule = scenario.rule.as_ref()?;
+        let updater = match &self.policy {
+            Solved::Automaton(automaton) => &automaton.updater,
+            Solved::Rule { updater, .. } => updater,
+            Solved::Control(_) => return None,
+        };
+        let space = updater.space(&scenario.model);
+        let told = Told::of(space.as_ref());
+        let keeper = space.updater();
+        let agent = || -> Box<dyn Agent + '_> { Box::new(HandAgent::new(&keeper, rule, &told)) };
+        Some(evaluate_agent(scenario, &agent, options, observer))
+    }
+
     /// How many strata beliefs are read as, where they are kept in full.
     fn strata(&self) -> Option<usize> {
         let updater = match &self.policy {

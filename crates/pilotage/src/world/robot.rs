@@ -251,7 +251,7 @@ mod tests {
     use crate::scenario::{Scenario, Simulator, find};
 
     fn arena(change: impl Fn(&mut Robot)) -> RobotArena {
-        let Scenario { model, truth } = find("robot-maze-4x4").unwrap();
+        let Scenario { model, truth, .. } = find("robot-maze-4x4").unwrap();
         let Simulator::Robot(mut robot) = truth.simulator else {
             panic!("no robot");
         };

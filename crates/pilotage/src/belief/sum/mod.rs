@@ -51,6 +51,8 @@ pub struct SumKeeping {
     effects: EffectTable,
     start: Sum,
     most: usize,
+    /// Whether a Gaussian that is too wide for its sensor may become several.
+    splits: bool,
     likeness: Likeness,
     /// For expectations of smooth functions.
     rule: Rule,
@@ -62,6 +64,12 @@ pub struct SumKeeping {
     bounds: Option<Vec<Interval>>,
 }
 
+/// Gaussians of a sum, unless the model says how many.
+const COMPONENTS: usize = 16;
+
+/// Gaussians of a mode in a coarse sum: what is free, and what has run against a wall on either side.
+const COARSE: usize = 3;
+
 /// A standard deviation so many times smaller than the start's, or than a tenth of the bounds, counts as none.
 const CERTAIN: f64 = 1e-4;
 
@@ -72,8 +80,7 @@ const MOST_POINTS: usize = 400;
 const SLICES: usize = 8;
 
 impl SumKeeping {
-    /// Sums of Gaussians for a model, of as many as [`crate::model::BeliefSettings::components`] says: by itself 40 for one state variable,
-    /// 16 for more.
+    /// Sums of Gaussians for a model, of as many as [`crate::model::BeliefSettings::components`] says: by itself 16.
     pub fn new(model: &Model) -> Self {
         let n = model.state_dim();
         let dynamics = Dynamics::new(model);
@@ -89,10 +96,8 @@ impl SumKeeping {
             start: Sum {
                 components: Vec::new(),
             },
-            most: model
-                .belief
-                .components
-                .unwrap_or(if n == 1 { 40 } else { 16 }),
+            most: model.belief.components.unwrap_or(COMPONENTS),
+            splits: true,
             likeness: Likeness::new((0..n).map(floor).collect(), dynamics.kinds()),
             rule: Rule::new(n, if n == 1 { 9 } else { 5 }),
             fine: Rule::new(n, if n == 1 { 15 } else { 7 }),
@@ -226,6 +231,14 @@ fn slices(start: Component) -> Vec<Component> {
 
 impl Keeping for SumKeeping {
     type Full = Sum;
+
+    fn coarse(&self) -> Option<Self> {
+        Some(Self {
+            most: self.most.min(COARSE * self.dynamics.modes()),
+            splits: false,
+            ..Self::new(&self.model)
+        })
+    }
 
     fn actions(&self) -> usize {
         self.dynamics.actions()

@@ -6,6 +6,7 @@ use super::line::pieces;
 use super::sensor::Sensor;
 use super::{Sum, SumKeeping};
 use crate::belief::full::Sensed;
+use crate::belief::gaussian::normal_quantile;
 use crate::belief::reading::Reading;
 use crate::model::{ActionId, ModeId};
 
@@ -116,7 +117,7 @@ impl SumKeeping {
         step: usize,
         symbols: usize,
     ) -> Vec<(f64, Sensed)> {
-        let mut likely = |sensed: &Sensed| -> f64 {
+        let likely = |sensed: &Sensed| -> f64 {
             let mut sensor = Sensor::new(self, action, step, sensed.reading());
             let each = full.components.iter().map(|component| {
                 sensor.set_mode(component.mode);
@@ -236,43 +237,9 @@ fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// Quantile of the standard normal for a probability in `(0, 1)`, to seven digits (M. Wichura, 1988, algorithm AS 241, PPND7).
-pub(super) fn normal_quantile(p: f64) -> f64 {
-    let q = p - 0.5;
-    if q.abs() <= 0.425 {
-        let r = 0.180_625 - q * q;
-        let above =
-            3.387_132_717_9 + r * (50.434_271_938 + r * (159.291_132_02 + r * 59.109_374_72));
-        let below = 1.0 + r * (17.895_169_469 + r * (78.757_757_664 + r * 67.187_563_6));
-        return q * above / below;
-    }
-    let r = (-p.min(1.0 - p).ln()).sqrt();
-    let tail = if r <= 5.0 {
-        let r = r - 1.6;
-        let above =
-            1.423_437_277_7 + r * (2.756_815_39 + r * (1.306_728_481_6 + r * 0.170_238_211_03));
-        above / (1.0 + r * (0.737_001_642_5 + r * 0.120_211_329_75))
-    } else {
-        let r = r - 5.0;
-        let above =
-            6.657_905_115 + r * (3.081_226_386_0 + r * (0.428_682_943_37 + r * 0.017_337_203_997));
-        above / (1.0 + r * (0.241_978_942_25 + r * 0.012_258_202_635))
-    };
-    if q < 0.0 { -tail } else { tail }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Lattice, normal_quantile};
-    use crate::belief::gaussian::normal_cdf;
-
-    #[test]
-    fn quantiles_are_those_of_the_cdf() {
-        for p in [1e-14, 1e-6, 0.01, 0.074, 0.076, 0.3, 0.5, 0.9, 0.999_999] {
-            let x = normal_quantile(p);
-            assert!((normal_cdf(x) / p - 1.0).abs() < 1e-5, "{p}: {x}");
-        }
-    }
+    use super::Lattice;
 
     #[test]
     fn a_lattice_takes_every_value_of_every_coordinate_once() {

@@ -66,8 +66,15 @@ impl SumKeeping {
             logs: Vec::with_capacity(count),
             best: f64::NEG_INFINITY,
             at: vec![0.0; self.dynamics.states()],
-            room: 3 * self.most.max(count),
-            pieces: (2 * self.most / count.max(1)).max(1),
+            room: if self.splits {
+                3 * self.most.max(count)
+            } else {
+                0
+            },
+            pieces: match self.splits {
+                true => (2 * self.most / count.max(1)).max(1),
+                false => 1,
+            },
         };
         let own = |component: &&Component| seen.is_none_or(|mode| mode == component.mode);
         for component in full.components.iter().filter(own) {

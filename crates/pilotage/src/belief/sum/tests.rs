@@ -495,7 +495,7 @@ fn ranges_are_taken_by_their_moments() {
     let narrow = [0.4, 0.2, 0.2, 0.6];
     let rough = |range: f64| 0.05 + 0.25 * range;
     let fine = |_: f64| 0.02;
-    for (p, name) in [(&wide, "wide"), (&narrow, "narrow")] {
+    for p in [&wide, &narrow] {
         for reading in [[4.2, 7.6], [2.0, 6.0], [6.0, 9.0]] {
             let keeping = beacons(true, rough, p);
             let mut sum = keeping.start();

@@ -33,7 +33,7 @@ use crate::progress::Progress;
 use crate::scenario::Scenario;
 use crate::simulate::{Options, evaluate};
 pub use grid_values::GridValues;
-use meet::{Met, meet};
+use meet::meet;
 use rows::Rows;
 
 /// Name of the solver in errors and policies.
@@ -63,8 +63,8 @@ pub struct CodebookPlanner {
 impl Default for CodebookPlanner {
     fn default() -> Self {
         Self {
-            strata: 40,
-            apart: 0.2,
+            strata: 60,
+            apart: 0.12,
             points: None,
             readings: 40,
             rounds: 3,
@@ -155,6 +155,7 @@ impl CodebookPlanner {
         seed: u64,
         observer: &dyn Progress,
     ) -> Result<Plan> {
+        let coarse = keeping.coarse();
         let mut codebook = Codebook::new(model);
         let mut met = meet(model, keeping.as_ref(), None, self.episodes, seed);
         let mut best: Option<Round> = None;
@@ -163,7 +164,8 @@ impl CodebookPlanner {
             let moments: Vec<Moments> = met.iter().map(|met| met.moments.clone()).collect();
             codebook.cover(&moments, self.apart, self.strata);
             let grid = self.grid(model, &moments);
-            let rows = Rows::new(keeping.as_ref(), &codebook, grid, &met, self);
+            let ways = (keeping.as_ref(), coarse.as_ref().unwrap_or(&keeping));
+            let rows = Rows::new(ways, &codebook, grid, &met, self);
             let found = rows.solve(model.discount, self.tolerance);
             let planned = rows.worth(keeping.as_ref(), &codebook, &found, model.discount, self);
             let values = GridValues::new(rows.grid, found, codebook.len(), model.actions.len());
@@ -221,7 +223,7 @@ impl CodebookPlanner {
     fn grid(&self, model: &Model, met: &[Moments]) -> super::grid::Grid {
         let n = model.state_dim();
         let points = self.points.unwrap_or(match n {
-            1 => 161,
+            1 => 401,
             2 => 33,
             3 => 15,
             _ => 9,

@@ -108,7 +108,7 @@ fn averaged(rows: &[Row]) -> Row {
 impl Rows {
     /// The rows of a codebook, refined on beliefs that were met.
     pub(super) fn new<K: Keeping>(
-        keeping: &K,
+        (keeping, coarse): (&K, &K),
         codebook: &Codebook,
         grid: Grid,
         met: &[Met<K::Full>],
@@ -123,18 +123,19 @@ impl Rows {
         let refined = refined::<K>(&reader, met, settings.refined);
         let of_state = |state: usize| -> Vec<Row> {
             let mean = grid.point(state % points);
-            let fulls: Vec<K::Full> = match refined.get(&state) {
-                Some(fulls) => fulls
-                    .iter()
-                    .map(|&i| keeping.moved_to(&met[i].full, &mean))
-                    .collect(),
+            let (keeping, fulls) = match refined.get(&state) {
+                Some(fulls) => {
+                    let moved = |&i: &usize| keeping.moved_to(&met[i].full, &mean);
+                    (keeping, fulls.iter().map(moved).collect::<Vec<K::Full>>())
+                }
                 None => {
                     let stratum = codebook.stratum(state / points);
-                    vec![keeping.with_moments(&Moments {
+                    let full = coarse.with_moments(&Moments {
                         mean,
                         covariance: stratum.covariance.clone(),
                         weights: stratum.weights.clone(),
-                    })]
+                    });
+                    (coarse, vec![full])
                 }
             };
             let of_action = |action: usize| {

@@ -9,8 +9,12 @@ use crate::belief::{Belief, BeliefSpace};
 use crate::model::ActionId;
 use crate::parallel;
 use crate::policy::{
-    Automaton, Branch, Feature, Matching, Node, Place, Policy, StratumFeatures, Test, Tree,
+    Automaton, AutomatonRunner, Branch, Feature, Matching, Node, Place, Policy, StratumFeatures,
+    Test, Tree,
 };
+use crate::progress::Silent;
+use crate::scenario::Scenario;
+use crate::simulate::{Options, evaluate};
 use crate::solve::rollout;
 
 /// How small a tree has to be.
@@ -72,6 +76,7 @@ pub(super) fn grow(
     let strata: Vec<StratumFeatures> = (0..space.strata())
         .map(|stratum| StratumFeatures::of(automaton, stratum))
         .collect();
+    let actions = space.model().actions.len();
     let value = policy.value(space.start()).map_or(0.0, f64::abs);
     let mut collected = Collected {
         beliefs: Vec::new(),
@@ -95,19 +100,92 @@ pub(super) fn grow(
             seed.wrapping_add(round as u64),
         );
         let discount = space.model().discount;
-        collected.add(
-            &runs,
-            policy,
-            space.model().actions.len(),
-            discount,
-            |belief, i| strata[belief.stratum].value(features[i], belief),
-        );
+        collected.add(&runs, policy, actions, discount, |belief, i| {
+            strata[belief.stratum].value(features[i], belief)
+        });
         // What was collected so far is the return that episodes of all rounds lose together.
         let allowed = size.loss * value * (round + 1) as f64;
-        let grown = Grown::new(&collected, space.model().actions.len(), size.nodes, allowed);
+        let grown = Grown::new(&collected, actions, size.nodes, allowed);
         grown.write(automaton, &collected, &features, policy);
     }
+    let of_size = |nodes: usize| {
+        let mut tree = automaton.clone();
+        let grown = Grown::new(&collected, actions, nodes, 0.0);
+        grown.write(&mut tree, &collected, &features, policy);
+        tree
+    };
+    *automaton = smallest(space, size, seed, &of_size);
 }
+
+/// The smallest tree that earns hardly less than the best, in the same episodes of the world that the model assumes: what a plan says of its
+/// own losses is off by as much as the plan.
+fn smallest(
+    space: &dyn BeliefSpace,
+    size: Size,
+    seed: u64,
+    of_size: &dyn Fn(usize) -> Automaton,
+) -> Automaton {
+    let assumed = Scenario::assumed(space.model());
+    let options = Options {
+        episodes: TRIALS,
+        seed: seed.wrapping_add(ROUNDS as u64),
+    };
+    let mut tried: Vec<(f64, Automaton)> = Vec::new();
+    let mut best = f64::NEG_INFINITY;
+    let mut since = 0;
+    for nodes in sizes(size.nodes) {
+        let tree = of_size(nodes);
+        let grew = tried
+            .last()
+            .is_none_or(|(_, last)| tree.nodes.len() > last.nodes.len());
+        if grew {
+            let runner = AutomatonRunner::new(&tree);
+            let earned = evaluate(&assumed, &tree.updater, &runner, options, &Silent);
+            let earned = earned.discounted.mean;
+            since = if earned > best + 0.1 * size.loss * best.abs() {
+                0
+            } else {
+                since + 1
+            };
+            best = best.max(earned);
+            tried.push((earned, tree));
+        }
+        if since >= PATIENCE || (!grew && nodes > 4 * tried.len()) {
+            break;
+        }
+    }
+    let enough = best - size.loss * best.abs();
+    let chosen = tried
+        .iter()
+        .position(|(earned, _)| *earned >= enough)
+        .unwrap_or(0);
+    tried.swap_remove(chosen).1
+}
+
+/// Numbers of nodes that are tried: each about a third more than the one before, up to the most.
+fn sizes(most: usize) -> Vec<usize> {
+    let mut sizes = vec![1];
+    while let Some(&last) = sizes.last() {
+        let next = (last + 1).max(last * 4 / 3);
+        if next > most {
+            break;
+        }
+        sizes.push(next);
+    }
+    if sizes.last() != Some(&most) && most < LARGE {
+        sizes.push(most);
+    }
+    sizes
+}
+
+/// Episodes by which trees are compared.
+const TRIALS: usize = 2000;
+
+/// Trees that may be no better than those before, one after the other, until no larger one is tried.
+const PATIENCE: usize = 4;
+
+/// A limit beyond which it need not be tried itself.
+const LARGE: usize = 500;
 
 /// What the tree may ask: means, deviations where strata differ in them, modes where there are several.
 fn features(space: &dyn BeliefSpace, automaton: &Automaton) -> Vec<Feature> {

@@ -1,0 +1,332 @@
+use super::*;
+use crate::belief::KalmanFilter;
+use crate::belief::full::Keeping;
+use crate::model::{BeliefSettings, Clause, Formula, ModelBuilder, Then, WallBelief};
+use nalgebra::{DMatrix, DVector};
+
+fn hallway(cells: Option<usize>) -> Model {
+    ModelBuilder::new("hallway", 0.9)
+        .variable("x", -10.0, 10.0)
+        .start(&[0.3], &[0.5])
+        .motion(&[0.9], &[1.0], &[0.1])
+        .sensor(&[1.0], &[0.4])
+        .action("FORWARD", &[1.0])
+        .action("BACK", &[-1.0])
+        .reward(1.0, Clause::new().within("x", 1.0, 2.0))
+        .belief(BeliefSettings {
+            cells,
+            ..BeliefSettings::default()
+        })
+        .build()
+        .unwrap()
+}
+
+fn plane() -> Model {
+    ModelBuilder::new("plane", 0.9)
+        .variable("x", -8.0, 8.0)
+        .variable("v", -4.0, 4.0)
+        .start(&[0.3, 0.1], &[0.5, 0.2, 0.2, 0.3])
+        .motion(&[1.0, 0.3, 0.0, 0.9], &[0.0, 0.4], &[0.2, 0.1, 0.1, 0.2])
+        .sensor(&[1.0, 0.0, 0.3, 1.0], &[0.4, 0.1, 0.1, 0.6])
+        .action("FORWARD", &[1.0])
+        .action("BACK", &[-1.0])
+        .reward(1.0, Clause::new().within("x", 1.0, 2.0))
+        .belief(BeliefSettings {
+            cells: Some(60),
+            ..BeliefSettings::default()
+        })
+        .build()
+        .unwrap()
+}
+
+fn moments(keeping: &CellsKeeping, full: &Cells) -> Moments {
+    let mut moments = Moments::default();
+    keeping.moments(full, &mut moments);
+    moments
+}
+
+fn kalman(model: &Model) -> KalmanFilter {
+    KalmanFilter {
+        a: model.motion.a.clone(),
+        b: model.motion.b.clone(),
+        q: model.motion.noise.clone(),
+        h: model.sensor.h.clone(),
+        r: model.sensor.noise.clone(),
+        mean: model.start[0].mean.clone(),
+        covariance: model.start[0].covariance.clone(),
+    }
+}
+
+/// Cells agree with the Kalman filter where that is exact, to within what a cell's width blurs: its square, a step.
+fn follows_kalman(model: &Model, readings: &[&[f64]], within: f64) {
+    let keeping = CellsKeeping::new(model).unwrap();
+    let (mut full, mut filter) = (keeping.start(), kalman(model));
+    for (step, reading) in readings.iter().enumerate() {
+        let action = step % 2;
+        keeping.act(&mut full, action, step);
+        keeping.sense(&mut full, action, step, Reading::Values(reading));
+        filter.step(
+            &model.actions[action].control,
+            &DVector::from_column_slice(reading),
+        );
+        let moments = moments(&keeping, &full);
+        let n = model.state_dim();
+        let mean = DVector::from_column_slice(&moments.mean);
+        let covariance = DMatrix::from_row_slice(n, n, &moments.covariance);
+        assert!((mean - &filter.mean).amax() < within, "{step}");
+        assert!((covariance - &filter.covariance).amax() < within, "{step}");
+    }
+}
+
+#[test]
+fn cells_follow_the_kalman_filter_where_that_is_exact() {
+    let readings: [&[f64]; 4] = [&[1.0], &[0.2], &[2.5], &[0.9]];
+    follows_kalman(&hallway(None), &readings, 0.004);
+    let readings: [&[f64]; 4] = [&[1.0, 0.3], &[0.5, 0.1], &[0.2, 0.9], &[1.0, -0.2]];
+    follows_kalman(&plane(), &readings, 0.03);
+}
+
+/// Noise much narrower than a cell: the mean is kept to a part of a cell, and no reading is impossible.
+#[test]
+fn readings_narrower_than_a_cell_place_the_mean_within_it() {
+    let mut model = hallway(Some(20));
+    model.sensor.noise[(0, 0)] = 1e-6;
+    let keeping = CellsKeeping::new(&model).unwrap();
+    for k in 0..40 {
+        let reading = -1.5 + 0.1 * f64::from(k);
+        let mut full = keeping.start();
+        keeping.act(&mut full, 0, 0);
+        keeping.sense(&mut full, 0, 0, Reading::Values(&[reading]));
+        let moments = moments(&keeping, &full);
+        assert!(
+            (moments.mean[0] - reading).abs() <= 0.5 + 1e-9,
+            "{reading}: {moments:?}"
+        );
+        assert!(moments.covariance[0] < 0.4, "{reading}: {moments:?}");
+    }
+}
+
+fn eventful() -> Model {
+    ModelBuilder::new("eventful", 0.9)
+        .variable("x", 0.0, 4.0)
+        .mode("empty")
+        .mode("loaded")
+        .start_of(0.6, Some("empty"), &[1.1], &[0.5])
+        .start_of(0.4, Some("loaded"), &[2.7], &[0.3])
+        .motion(&[1.0], &[1.0], &[0.3])
+        .sensor(&[1.0], &[0.25])
+        .present(0.7)
+        .action("EAST", &[1.0])
+        .action("WEST", &[-1.0])
+        .event(
+            2.0,
+            Some("loaded"),
+            Then::Continue,
+            Clause::new()
+                .in_mode("empty")
+                .within("x", 0.0, 1.05)
+                .after(),
+        )
+        .event(
+            3.0,
+            Some("empty"),
+            Then::Continue,
+            Clause::new()
+                .in_mode("loaded")
+                .within("x", 2.77, 4.0)
+                .with_probability(0.4),
+        )
+        .event(
+            -1.0,
+            None,
+            Then::End,
+            Clause::new()
+                .within("x", 1.5, 1.9)
+                .with_probability(0.25)
+                .after(),
+        )
+        .event(
+            1.0,
+            None,
+            Then::Restart,
+            Clause::new()
+                .on("WEST")
+                .within("x", 1.0, 1.7)
+                .with_probability(0.5),
+        )
+        .reward(0.5, Clause::new().within("x", 0.33, 2.21).after())
+        .reward_of(
+            Formula::coded("square", |point| point.state[0].powi(2)),
+            Clause::new().within("x", 0.33, 2.21),
+        )
+        .alive(Clause::new().within("x", 0.21, 3.87), -5.0)
+        .build()
+        .unwrap()
+}
+
+#[test]
+fn what_ends_restarts_and_goes_on_is_all_there_is() {
+    for model in [eventful(), hallway(None), plane()] {
+        let keeping = CellsKeeping::new(&model).unwrap();
+        let from = keeping.start();
+        for action in 0..2 {
+            let mut to = vec![0.0; from.mass.len()];
+            keeping.forward(action, &from.mass, &mut to);
+            let mut full = from.clone();
+            let acted = keeping.act(&mut full, action, 0);
+            let goes_on: f64 = to.iter().sum();
+            assert!((goes_on + acted.ended + acted.restarted - 1.0).abs() < 1e-8);
+            assert!((full.mass.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            // What is expected of values is the same from either end.
+            let values: Vec<f64> = (0..to.len()).map(|i| (i as f64).sin()).collect();
+            let ahead: f64 = to.iter().zip(&values).map(product).sum();
+            let behind: f64 = from
+                .mass
+                .iter()
+                .zip(&keeping.backward(action, &values))
+                .map(product)
+                .sum();
+            assert!((ahead - behind).abs() < 1e-12);
+        }
+    }
+}
+
+/// The step of a world of many states, event by event, against the sums over cells. Standard errors of 2e5 draws are below a quarter of what is allowed.
+#[test]
+fn a_step_of_cells_is_what_the_world_does() {
+    use crate::scenario::Scenario;
+    use crate::world::{Observation, ProblemWorld, Streams, World};
+    const DRAWS: usize = 200_000;
+    for walls in [WallBelief::Ignore, WallBelief::Clip] {
+        let mut model = eventful();
+        model.belief.walls = walls;
+        model.belief.cells = Some(400);
+        let keeping = CellsKeeping::new(&model).unwrap();
+        let mut world = ProblemWorld::new(&Scenario::assumed(&model));
+        let mut draws = Streams::new(7, 0);
+        let mut observation = Observation::new(1);
+        for action in 0..2 {
+            let (mut reward, mut ended, mut restarted, mut loaded, mut sum) =
+                (0.0, 0.0, 0.0, 0.0, 0.0);
+            for _ in 0..DRAWS {
+                world.reset(&mut draws);
+                let step = world.step(action, &mut draws, &mut observation);
+                reward += step.reward / DRAWS as f64;
+                match step.then {
+                    Then::End => ended += 1.0 / DRAWS as f64,
+                    Then::Restart => restarted += 1.0 / DRAWS as f64,
+                    Then::Continue => {
+                        loaded += world.mode() as f64 / DRAWS as f64;
+                        sum += world.state()[0] / DRAWS as f64;
+                    }
+                }
+            }
+            let mut full = keeping.start();
+            let acted = keeping.act(&mut full, action, 0);
+            let moments = moments(&keeping, &full);
+            let left = 1.0 - acted.ended - acted.restarted;
+            for (name, drawn, kept, within) in [
+                ("reward", reward, acted.reward, 0.03),
+                ("ended", ended, acted.ended, 0.004),
+                ("restarted", restarted, acted.restarted, 0.004),
+                ("loaded", loaded, left * moments.weights[1], 0.004),
+                ("mean", sum, left * moments.mean[0], 0.012),
+            ] {
+                assert!(
+                    (drawn - kept).abs() < within,
+                    "{walls:?} {action} {name}: {drawn} {kept}"
+                );
+            }
+        }
+    }
+}
+
+/// Posteriors averaged over the readings are what was believed before.
+#[test]
+fn readings_say_on_average_what_was_believed() {
+    for (model, most) in [(eventful(), 400), (hallway(None), 400), (plane(), 500)] {
+        let keeping = CellsKeeping::new(&model).unwrap();
+        let mut full = keeping.start();
+        keeping.act(&mut full, 0, 0);
+        let readings = keeping.readings(&full, 0, 0, most);
+        let sum: f64 = readings.iter().map(|(likely, _)| likely).sum();
+        assert!((sum - 1.0).abs() < 1e-12);
+        let mut average = vec![0.0; full.mass.len()];
+        for (likely, sensed) in &readings {
+            let mut after = full.clone();
+            keeping.sense(&mut after, 0, 0, sensed.reading());
+            for (sum, mass) in average.iter_mut().zip(&after.mass) {
+                *sum += likely * mass;
+            }
+        }
+        let average = Cells { mass: average };
+        let (before, after) = (moments(&keeping, &full), moments(&keeping, &average));
+        let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.02);
+        assert!(close(&before.mean, &after.mean), "{before:?} {after:?}");
+        assert!(
+            close(&before.covariance, &after.covariance),
+            "{before:?} {after:?}"
+        );
+        assert!(
+            close(&before.weights, &after.weights),
+            "{before:?} {after:?}"
+        );
+    }
+}
+
+#[test]
+fn moments_come_back_and_means_move() {
+    for model in [hallway(None), plane()] {
+        let keeping = CellsKeeping::new(&model).unwrap();
+        let given = moments(&keeping, &keeping.start());
+        let again = moments(&keeping, &keeping.with_moments(&given));
+        let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.03);
+        assert!(close(&given.mean, &again.mean) && close(&given.covariance, &again.covariance));
+        let mean: Vec<f64> = given.mean.iter().map(|x| x + 1.23).collect();
+        let moved = moments(&keeping, &keeping.moved_to(&keeping.start(), &mean));
+        assert!(close(&moved.mean, &mean), "{moved:?}");
+        assert!(close(&moved.covariance, &given.covariance), "{moved:?}");
+    }
+}
+
+/// Whole numbers have a cell each, signals count as they are likely, and a discrete sensor says each of them.
+#[test]
+fn whole_numbers_and_signals_are_exact() {
+    let text = r#"
+        format = 1
+        name = "rungs"
+        discount = 0.9
+        [state]
+        names = ["x"]
+        bounds = [[0.0, 4.0]]
+        integer = ["x"]
+        [start]
+        mean = [2.0]
+        covariance = [[0.0]]
+        [motion]
+        A = [[1.0]]
+        B = [[1.0]]
+        noise = [[0.0]]
+        [sensor]
+        symbols = { high = "0.1 + 0.2*x", low = "rest" }
+        [actions]
+        UP = { u = [1.0] }
+        STAY = { u = [0.0] }
+        [[reward]]
+        in = { x = [4.0, 5.0] }
+        value = 1.0
+    "#;
+    let model = crate::scenario::read(text, "rungs").unwrap().model;
+    let keeping = CellsKeeping::new(&model).unwrap();
+    assert_eq!(keeping.cells(), 5);
+    let mut full = Cells {
+        mass: vec![0.2, 0.3, 0.5, 0.0, 0.0],
+    };
+    keeping.act(&mut full, 0, 0);
+    assert_eq!(full.mass, [0.0, 0.2, 0.3, 0.5, 0.0]);
+    let readings = keeping.readings(&full, 0, 0, 1);
+    let high = 0.2 * 0.3 + 0.3 * 0.5 + 0.5 * 0.7;
+    assert!((readings[0].0 - high).abs() < 1e-12 && readings.len() == 2);
+    keeping.sense(&mut full, 0, 0, Reading::Symbol(0));
+    assert!((full.mass[3] - 0.35 / high).abs() < 1e-12);
+}

@@ -1,0 +1,210 @@
+//! Backups: the best action at a belief by one look ahead, and the vector of doing so.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use super::point::{Point, ValueVector, VectorSet};
+use super::signals::Partition;
+use crate::belief::{CellsKeeping, Keeping};
+use crate::model::ActionId;
+
+/// A signal that is less likely says nothing about what to do after it.
+const NEVER: f64 = 1e-14;
+
+/// Blind policies are followed until so little of their value is missing, or so many steps.
+const MISSING: f64 = 1e-10;
+const STEPS: usize = 20_000;
+
+/// A model on cells, as backups see it.
+#[derive(Debug, Clone)]
+pub(super) struct Backup {
+    pub(super) keeping: Arc<CellsKeeping>,
+    pub(super) discount: f64,
+    /// Most bins along a reading.
+    pub(super) bins: usize,
+    pub(super) start: Point,
+}
+
+/// An action at a belief, what to go on with after each signal, and what that is worth.
+#[derive(Debug, Clone)]
+pub(super) struct Choice {
+    pub(super) action: ActionId,
+    pub(super) value: f64,
+    /// The vector to go on with after each signal; empty where the episode never goes on.
+    pub(super) picks: Vec<usize>,
+    pub(super) partition: Partition,
+}
+
+impl Backup {
+    pub(super) fn new(keeping: Arc<CellsKeeping>, discount: f64, bins: usize) -> Self {
+        Self {
+            start: Point::new(keeping.start().probabilities()),
+            keeping,
+            discount,
+            bins,
+        }
+    }
+
+    /// The best choice at a belief, the first of several.
+    pub(super) fn choose(&self, point: &Point, set: &VectorSet) -> Choice {
+        let choices = (0..self.keeping.actions()).map(|action| self.choice(action, point, set));
+        let better = |best: Choice, next: Choice| match next.value > best.value {
+            true => next,
+            false => best,
+        };
+        let worst = Choice {
+            action: 0,
+            value: f64::NEG_INFINITY,
+            picks: Vec::new(),
+            partition: Partition::Signals,
+        };
+        choices.fold(worst, better)
+    }
+
+    /// An action, and the best there is to go on with after it.
+    fn choice(&self, action: ActionId, point: &Point, set: &VectorSet) -> Choice {
+        let keeping = &*self.keeping;
+        let mut from = vec![0.0; keeping.states()];
+        for (state, mass) in point.states.iter().zip(&point.masses) {
+            from[*state] = *mass;
+        }
+        let mut to = vec![0.0; from.len()];
+        keeping.forward(action, &from, &mut to);
+        let restarted = point.expected(keeping.restarts(action));
+        let mut value =
+            point.expected(keeping.rewards(action)) + self.discount * restarted * set.start;
+        let mut picks = Vec::new();
+        let mut partition = Partition::Signals;
+        let ahead = Point::new(&to);
+        if !ahead.states.is_empty() {
+            partition = Partition::new(keeping, action, &to, self.bins);
+            let likely = partition.likelihoods(keeping, action, &ahead.states);
+            let later;
+            (picks, later) = best_after(&likely, &ahead, set);
+            value += self.discount * later;
+        }
+        Choice {
+            action,
+            value,
+            picks,
+            partition,
+        }
+    }
+
+    /// Going on with a vector for ever, whatever is sensed (a discrete sensor's signal, that is).
+    pub(super) fn repeat(&self, vector: usize, set: &VectorSet) -> Choice {
+        let action = set.vectors[vector].action;
+        let ahead = self
+            .keeping
+            .backward(action, &vec![1.0; self.keeping.states()]);
+        let goes_on = ahead.iter().any(|share| *share > 0.0);
+        let signals = self.keeping.sensor().table(action, 0).signals.len() + 1;
+        Choice {
+            action,
+            value: f64::NAN,
+            picks: if goes_on {
+                vec![vector; signals]
+            } else {
+                Vec::new()
+            },
+            partition: Partition::Signals,
+        }
+    }
+
+    /// What a choice is worth in every mode and cell.
+    pub(super) fn vector(&self, choice: &Choice, point: Point, set: &VectorSet) -> ValueVector {
+        let vector = |pick: usize| &set.vectors[pick].values[..];
+        let values = self.values(choice, &vector, set.start);
+        ValueVector {
+            action: choice.action,
+            values,
+            witness: Some(Arc::new(point)),
+        }
+    }
+
+    /// The same where `vector` says what it is worth to go on, and `start` what a restart is.
+    pub(super) fn values<'a>(
+        &self,
+        choice: &Choice,
+        vector: &dyn Fn(usize) -> &'a [f64],
+        start: f64,
+    ) -> Vec<f64> {
+        let states: Vec<usize> = (0..self.keeping.states()).collect();
+        let mut later = vec![0.0; states.len()];
+        if !choice.picks.is_empty() {
+            let partition = &choice.partition;
+            let likely = partition.likelihoods(&self.keeping, choice.action, &states);
+            for (state, later) in later.iter_mut().enumerate() {
+                let signals = choice.picks.iter().zip(likely.column(state));
+                *later = signals
+                    .filter(|(_, likely)| **likely > 0.0)
+                    .map(|(pick, likely)| likely * vector(*pick)[state])
+                    .sum();
+            }
+        }
+        self.before(choice.action, &later, start)
+    }
+
+    /// What an action is worth where `later` is had after it.
+    fn before(&self, action: ActionId, later: &[f64], start: f64) -> Vec<f64> {
+        let mut values = self.keeping.backward(action, later);
+        let rewards = self.keeping.rewards(action).iter();
+        let restarts = self.keeping.restarts(action).iter();
+        for (value, (reward, restart)) in values.iter_mut().zip(rewards.zip(restarts)) {
+            *value = reward + self.discount * (*value + restart * start);
+        }
+        values
+    }
+
+    /// What repeating an action for ever is worth, and never more.
+    pub(super) fn blind(&self, action: ActionId) -> ValueVector {
+        let rewards = self.keeping.rewards(action).iter();
+        let worst = rewards.fold(0.0f64, |worst, reward| worst.min(*reward));
+        let mut values = vec![worst / (1.0 - self.discount); self.keeping.states()];
+        for _ in 0..STEPS {
+            let start = self.start.expected(&values);
+            let next = self.before(action, &values, start);
+            let pairs = next.iter().zip(&values);
+            let change = pairs.fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+            values = next;
+            if change <= MISSING * (1.0 - self.discount) {
+                break;
+            }
+        }
+        ValueVector {
+            action,
+            values,
+            witness: None,
+        }
+    }
+}
+
+/// The best vector after each signal (rows of `likely`), and what they are worth together.
+fn best_after(likely: &DMatrix<f64>, ahead: &Point, set: &VectorSet) -> (Vec<usize>, f64) {
+    let (signals, met) = likely.shape();
+    let joint = DMatrix::from_fn(met, signals, |i, signal| {
+        likely[(signal, i)] * ahead.masses[i]
+    });
+    let vectors = DMatrix::from_fn(met, set.vectors.len(), |i, vector| {
+        set.vectors[vector].values[ahead.states[i]]
+    });
+    // Columns side by side: what each vector is worth together with each signal.
+    let worth = vectors.tr_mul(&joint);
+    let (on_average, _) = set.best(ahead);
+    let best = |signal: usize| {
+        let column = worth.column(signal);
+        if joint.column(signal).sum() <= NEVER {
+            return (on_average, column[on_average]);
+        }
+        let first = (0, f64::NEG_INFINITY);
+        let pairs = column.iter().copied().enumerate();
+        pairs.fold(first, |best, next| match next.1 > best.1 {
+            true => next,
+            false => best,
+        })
+    };
+    let chosen: Vec<(usize, f64)> = (0..signals).map(best).collect();
+    let value = chosen.iter().map(|(_, value)| value).sum();
+    (chosen.into_iter().map(|(pick, _)| pick).collect(), value)
+}

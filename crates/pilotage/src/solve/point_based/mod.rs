@@ -1,0 +1,302 @@
+//! Point-based value iteration on cells, for models of one or two state variables: beliefs of any shape, discrete sensors, noise and
+//! motion that depend on the state.
+//!
+//! Beliefs are kept as probabilities of cells ([`CellsKeeping`]). Those met by acting are collected, and vectors over modes and cells,
+//! each the value of a policy, are backed up at them. It begins with the values of repeating one action for ever, and every value stays
+//! one that a policy earns on the cells, so that what the plan says is a lower bound there. Values are summed without end: in an episode
+//! that stops earlier, less may be earned by the discount to the power of its length.
+//!
+//! # References
+//! - J. Pineau, G. Gordon and S. Thrun, "Point-based value iteration: an anytime algorithm for POMDPs", 2003.
+//! - M. T. J. Spaan and N. Vlassis, "Perseus: randomized point-based value iteration for POMDPs", 2005.
+//! - J. Hoey and P. Poupart, "Solving POMDPs with continuous or large discrete observation spaces", 2005 (readings in bins).
+
+mod backup;
+mod graph;
+mod improve;
+mod point;
+mod policy;
+mod signals;
+#[cfg(test)]
+mod tests;
+mod walk;
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use graph::{PolicyGraph, PolicyNode};
+pub use point::ValueVector;
+pub use policy::PointBasedPolicy;
+
+use super::refusals;
+use super::settings::{PAIRED, Settings, ensure, ensure_count};
+use super::solver::{refuse, refuse_if};
+use crate::belief::CellsKeeping;
+use crate::error::Result;
+use crate::model::Model;
+use crate::progress::Progress;
+use crate::random::{Rng, Role, stream};
+use backup::Backup;
+use improve::improve;
+use point::{Point, VectorSet};
+use walk::{Met, Walker};
+
+/// Name of the solver in errors and policies.
+const SOLVER: &str = "point-based";
+
+/// Most bins along a reading where settings do not say, for one and for two readings.
+const BINS: [usize; 2] = [40, 12];
+
+/// Most readings that are cut into bins.
+const MOST_READINGS: usize = BINS.len();
+
+/// Rounds of backups between two times that beliefs are collected.
+const SWEEPS: usize = 12;
+
+/// Share of what a round has to gain that counts as a gain at a belief.
+const HARDLY: f64 = 0.01;
+
+/// A graph is improved by backups at most so often.
+const GRAPHS: usize = 8;
+
+/// What point-based value iteration can be told.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PointBased {
+    /// Most beliefs at which values are backed up; 1 to 10000.
+    pub beliefs: usize,
+    /// Sum of the differences of probabilities by which two of them are apart at least; 0 to 2.
+    pub apart: f64,
+    /// Most times that beliefs are collected and backed up; at least 1, at most 10000.
+    pub rounds: usize,
+    /// Share of the value of the start; a round that gains less is the last one. Above 0.
+    pub epsilon: f64,
+    /// Probability of another action than the best where beliefs are collected; 0 to 1.
+    pub exploration: f64,
+    /// Most bins along a reading, at least 2, at most 10000; `auto` for 40 of one reading and 12 of two.
+    pub bins: Option<usize>,
+    /// Seed of the random numbers.
+    pub seed: u64,
+}
+
+impl Default for PointBased {
+    fn default() -> Self {
+        Self {
+            beliefs: 1000,
+            apart: 0.1,
+            rounds: 20,
+            epsilon: 1e-3,
+            exploration: 0.15,
+            bins: None,
+            seed: 1,
+        }
+    }
+}
+
+impl Settings for PointBased {
+    fn validate(&self) -> Result<()> {
+        ensure_count("beliefs", self.beliefs, 1, PAIRED)?;
+        ensure_count("rounds", self.rounds, 1, PAIRED)?;
+        if let Some(bins) = self.bins {
+            ensure_count("bins", bins, 2, PAIRED)?;
+        }
+        let fits = (0.0..=2.0).contains(&self.apart);
+        ensure("apart", self.apart, fits, "from 0 to 2")?;
+        let fits = (0.0..=1.0).contains(&self.exploration);
+        ensure("exploration", self.exploration, fits, "from 0 to 1")?;
+        let fits = self.epsilon > 0.0 && self.epsilon.is_finite();
+        ensure("epsilon", self.epsilon, fits, "above 0")
+    }
+}
+
+/// What point-based value iteration found.
+#[derive(Debug, Clone)]
+pub struct PointBasedPlan {
+    /// What can be earned from the start, at least.
+    pub value: f64,
+    /// What to do at a belief.
+    pub policy: PointBasedPolicy,
+    /// The policy as a graph, if the sensor is discrete: what its nodes earn is its own value, beside that of the vectors.
+    pub graph: Option<PolicyGraph>,
+    /// Beliefs at which values were backed up.
+    pub beliefs: usize,
+    /// Whether the last round gained less than it was told to.
+    pub converged: bool,
+}
+
+/// Whether point-based value iteration is made for a model, as far as can be told without making its cells.
+///
+/// # Errors
+/// [`crate::Error::Unsupported`] with the reason, and what would do.
+pub fn accepts(model: &Model) -> Result<()> {
+    let n = model.state_dim();
+    let variables = (n > 2).then(|| {
+        format!("it has {n} state variables, and cells are kept of one or two; use another solver")
+    });
+    let numbers = model.sensor_dim();
+    let readings = (numbers > MOST_READINGS).then(|| {
+        format!("it reads {numbers} numbers, and at most {MOST_READINGS} are cut into bins; use another solver")
+    });
+    let reason = refusals::reward_missing(model)
+        .or_else(|| refusals::changes(model))
+        .or(variables)
+        .or(readings)
+        .or_else(|| ends_cost(model));
+    refuse_if(SOLVER, model, reason)
+}
+
+/// Values without end have no last state.
+fn ends_cost(model: &Model) -> Option<String> {
+    let cost = model.cost.as_ref()?;
+    let costs = cost.terminal.iter().any(|weight| *weight != 0.0);
+    costs.then(|| {
+        "the state in which an episode ends costs (`terminal` in [cost]), and this solver looks ahead without end; use lqg".to_owned()
+    })
+}
+
+/// Plans on cells.
+///
+/// # Errors
+/// As [`accepts`], [`crate::Error::Setting`] for settings out of range, and [`crate::Error::Unsupported`] for a model of which cells
+/// cannot be made.
+pub fn solve(
+    model: &Model,
+    settings: &PointBased,
+    observer: &dyn Progress,
+) -> Result<PointBasedPlan> {
+    settings.validate()?;
+    accepts(model)?;
+    let keeping = Arc::new(CellsKeeping::new(model)?);
+    let usual = BINS.get(model.sensor_dim().saturating_sub(1));
+    let bins = settings.bins.or(usual.copied());
+    let Some(bins) = bins else {
+        return Err(refuse(SOLVER, model, "it reads too many numbers"));
+    };
+    let backup = Backup::new(keeping, model.discount, bins);
+    let search = Search {
+        backup: &backup,
+        settings,
+        length: model.episode.length,
+        observer,
+    };
+    let (met, set, converged) = search.run();
+    let (set, graph) = search.graph(&met, set);
+    Ok(PointBasedPlan {
+        value: set.start,
+        policy: PointBasedPolicy::new(backup, set),
+        graph,
+        beliefs: met.points.len(),
+        converged,
+    })
+}
+
+struct Search<'a> {
+    backup: &'a Backup,
+    settings: &'a PointBased,
+    /// Steps of an episode.
+    length: usize,
+    observer: &'a dyn Progress,
+}
+
+impl Search<'_> {
+    fn rng(&self) -> Rng {
+        stream(self.settings.seed, u64::MAX, Role::Planner)
+    }
+
+    /// The values of repeating one action for ever.
+    fn blind(&self) -> VectorSet {
+        use crate::belief::Keeping;
+        let actions = 0..self.backup.keeping.actions();
+        let vectors = actions.map(|action| Arc::new(self.backup.blind(action)));
+        VectorSet::new(vectors.collect(), &self.backup.start)
+    }
+
+    fn walker<'b>(&'b self, vectors: Option<&'b VectorSet>) -> Walker<'b> {
+        Walker {
+            backup: self.backup,
+            vectors,
+            exploration: self.settings.exploration,
+            length: self.length,
+            seed: self.settings.seed,
+        }
+    }
+
+    /// Collects beliefs and backs them up in turns, until a round gains little.
+    fn run(&self) -> (Met, VectorSet, bool) {
+        let most = self.settings.beliefs;
+        let mut rng = self.rng();
+        let mut set = self.blind();
+        let mut met = Met::new(self.backup.start.clone(), self.settings.apart);
+        met.collect(&self.walker(None), most.div_ceil(4));
+        let mut quiet = 0;
+        for round in 0..self.settings.rounds {
+            let before = set.start;
+            set = self.sweep(&met.points, set, &mut rng);
+            let gain = set.start - before;
+            self.observer.progress(
+                "backing up beliefs",
+                round as u64 + 1,
+                self.settings.rounds as u64,
+            );
+            self.observer.status(&format!(
+                "{} beliefs, {} vectors, value {:.4}",
+                met.points.len(),
+                set.vectors.len(),
+                set.start
+            ));
+            quiet = match gain <= self.settings.epsilon * set.start.abs() {
+                true => quiet + 1,
+                false => 0,
+            };
+            // A round of quiet may be for want of beliefs.
+            if quiet == 2 {
+                return (met, set, true);
+            }
+            let share = most.div_ceil(8).max(1);
+            let more = (met.points.len() + share).min(most);
+            met.collect(&self.walker(Some(&set)), more);
+        }
+        (met, set, false)
+    }
+
+    /// Backs up until little is gained anywhere.
+    fn sweep(&self, points: &[Point], mut set: VectorSet, rng: &mut Rng) -> VectorSet {
+        for _ in 0..SWEEPS {
+            let little = self.settings.epsilon * set.start.abs();
+            let improved = improve(self.backup, points, &set, HARDLY * little, rng);
+            set = improved.set;
+            if improved.gain <= little {
+                break;
+            }
+        }
+        set
+    }
+
+    /// The best graph of some, each made of vectors that the values of the one before have joined.
+    fn graph(&self, met: &Met, mut set: VectorSet) -> (VectorSet, Option<PolicyGraph>) {
+        if !self.backup.keeping.is_discrete() {
+            return (set, None);
+        }
+        let mut rng = self.rng();
+        let mut best: Option<PolicyGraph> = None;
+        for _ in 0..GRAPHS {
+            let graph = PolicyGraph::new(self.backup, &set);
+            let known = best.as_ref().map_or(f64::NEG_INFINITY, |best| best.value);
+            let gain = graph.value - known;
+            let vectors = graph
+                .vectors()
+                .into_iter()
+                .chain(set.vectors.iter().cloned());
+            set = VectorSet::new(vectors.collect(), &self.backup.start);
+            if gain > 0.0 {
+                best = Some(graph);
+            }
+            if gain <= 0.1 * self.settings.epsilon * set.start.abs() {
+                break;
+            }
+            set = self.sweep(&met.points, set, &mut rng);
+        }
+        (set, best)
+    }
+}

@@ -1,0 +1,265 @@
+use super::*;
+use crate::belief::{Cells, Keeping};
+use crate::model::Then;
+use crate::parallel;
+use crate::progress::Silent;
+use crate::scenario::{Scenario, find, read};
+use crate::world::{Observation, ProblemWorld, Streams, World};
+
+/// Mean of the discounted returns that someone earns in a world, and its standard error. A mind is made for every episode.
+fn earned<M>(
+    scenario: &Scenario,
+    episodes: usize,
+    begin: impl Fn() -> M + Sync + Send,
+    act: impl Fn(&mut M) -> usize + Sync + Send,
+    hear: impl Fn(&mut M, usize, Option<crate::belief::Reading<'_>>) + Sync + Send,
+) -> (f64, f64) {
+    let returns = parallel::map(episodes, |episode| {
+        let mut world = ProblemWorld::new(scenario);
+        let mut draws = Streams::new(11, episode as u64);
+        let mut observation = Observation::new(scenario.model.observation_dim());
+        let (mut weight, mut sum, mut mind) = (1.0, 0.0, begin());
+        world.reset(&mut draws);
+        for _ in 0..scenario.model.episode.length {
+            let action = act(&mut mind);
+            let step = world.step(action, &mut draws, &mut observation);
+            sum += weight * step.reward;
+            weight *= scenario.model.discount;
+            match step.then {
+                Then::End => break,
+                Then::Restart => hear(&mut mind, action, None),
+                Then::Continue => hear(&mut mind, action, Some(observation.reading())),
+            }
+        }
+        sum
+    });
+    let mean = returns.iter().sum::<f64>() / episodes as f64;
+    let spread: f64 = returns.iter().map(|one| (one - mean).powi(2)).sum();
+    (mean, spread.sqrt() / episodes as f64)
+}
+
+/// What the vectors earn: the action of the best one, or that by one look ahead.
+fn earned_by_vectors(
+    scenario: &Scenario,
+    plan: &PointBasedPlan,
+    episodes: usize,
+    ahead: bool,
+) -> (f64, f64) {
+    let (policy, keeping) = (&plan.policy, plan.policy.keeping());
+    earned(
+        scenario,
+        episodes,
+        || keeping.start(),
+        |full: &mut Cells| match ahead {
+            true => policy.look_ahead(full).0,
+            false => policy.action(full),
+        },
+        |full, action, reading| match reading {
+            None => *full = keeping.start(),
+            Some(reading) => {
+                keeping.act(full, action, 0);
+                keeping.sense(full, action, 0, reading);
+            }
+        },
+    )
+}
+
+/// What the graph earns.
+fn earned_by_graph(scenario: &Scenario, graph: &PolicyGraph, episodes: usize) -> (f64, f64) {
+    earned(
+        scenario,
+        episodes,
+        || 0,
+        |node: &mut usize| graph.nodes[*node].action,
+        |node, _, reading| {
+            let next = &graph.nodes[*node].next;
+            *node = match reading {
+                None => 0,
+                Some(crate::belief::Reading::Symbol(symbol)) => next[symbol as usize],
+                Some(_) => next[next.len() - 1],
+            }
+        },
+    )
+}
+
+fn tiger() -> Scenario {
+    let text = r#"
+        format = 1
+        name = "tiger-on-cells"
+        discount = 0.95
+        [state]
+        names = ["door"]
+        bounds = [[0.0, 1.0]]
+        integer = ["door"]
+        [[start]]
+        mean = [0.0]
+        covariance = [[0.0]]
+        [[start]]
+        mean = [1.0]
+        covariance = [[0.0]]
+        [motion]
+        A = [[1.0]]
+        B = [[1.0]]
+        noise = [[0.0]]
+        [sensor]
+        symbols = { left = "0.85 - 0.7*door", right = "rest" }
+        [actions]
+        LISTEN = { u = [0.0] }
+        LEFT = { u = [0.0], then = "restart" }
+        RIGHT = { u = [0.0], then = "restart" }
+        [[reward]]
+        action = "LISTEN"
+        value = -1.0
+        [[reward]]
+        action = "LEFT"
+        value = "if(door < 0.5, -100, 10)"
+        [[reward]]
+        action = "RIGHT"
+        value = "if(door < 0.5, 10, -100)"
+        [episode]
+        length = 400
+    "#;
+    read(text, "tiger").unwrap()
+}
+
+/// The value of the tiger problem over the difference of what was heard: 19.3714 (A. R. Cassandra's `tiger.95`).
+fn tiger_by_counts() -> f64 {
+    const MOST: usize = 30;
+    let right = |k: usize| 1.0 / (1.0 + (0.15f64 / 0.85).powi(k as i32 - MOST as i32));
+    let mut values = vec![0.0; 2 * MOST + 1];
+    for _ in 0..2000 {
+        let start = values[MOST];
+        let listen = |k: usize| {
+            let up = right(k) * 0.85 + (1.0 - right(k)) * 0.15;
+            let (above, below) = (values[(k + 1).min(2 * MOST)], values[k.saturating_sub(1)]);
+            -1.0 + 0.95 * (up * above + (1.0 - up) * below)
+        };
+        let open = |p: f64| 10.0 * p - 100.0 * (1.0 - p) + 0.95 * start;
+        let value = |k: usize| listen(k).max(open(right(k))).max(open(1.0 - right(k)));
+        values = (0..values.len()).map(value).collect();
+    }
+    values[MOST]
+}
+
+#[test]
+fn the_tiger_problem_has_its_known_value() {
+    let exact = tiger_by_counts();
+    assert!((exact - 19.3714).abs() < 1e-3, "{exact}");
+    let scenario = tiger();
+    let settings = PointBased {
+        apart: 1e-3,
+        epsilon: 1e-6,
+        rounds: 60,
+        ..PointBased::default()
+    };
+    let plan = solve(&scenario.model, &settings, &Silent).unwrap();
+    let graph = plan.graph.as_ref().unwrap();
+    assert!((plan.value - exact).abs() < 1e-3, "{} {exact}", plan.value);
+    assert!(
+        (graph.value - exact).abs() < 1e-3,
+        "{} {exact}",
+        graph.value
+    );
+    assert_eq!(graph.nodes.len(), 5);
+    let (mean, error) = earned_by_graph(&scenario, graph, 4000);
+    assert!((mean - graph.value).abs() < 3.0 * error, "{mean} {error}");
+}
+
+fn binary_light(cells: usize) -> Scenario {
+    let text = format!(
+        r#"
+        format = 1
+        name = "binary-light"
+        discount = 0.9
+        [state]
+        names = ["y"]
+        bounds = [[-12.0, 14.0]]
+        [start]
+        mean = [2.0]
+        covariance = [[9.0]]
+        [motion]
+        A = [[1.0]]
+        B = [[1.0]]
+        noise = [[0.0]]
+        [sensor]
+        symbols = {{ bright = "0.05 + 0.9/(1 + exp(-6*(1.5 - abs(y - 5))))", dark = "rest" }}
+        [actions]
+        DOWN = {{ u = [-1.0] }}
+        STOP = {{ u = [0.0], then = "end" }}
+        UP = {{ u = [1.0] }}
+        [[reward]]
+        action = "STOP"
+        value = -10.0
+        [[reward]]
+        action = "STOP"
+        in = {{ y = [-1.0, 1.0] }}
+        value = 20.0
+        [episode]
+        length = 100
+        [belief]
+        cells = {cells}
+    "#
+    );
+    read(&text, "binary-light").unwrap()
+}
+
+/// Says how it goes.
+struct Loud(std::time::Instant);
+
+impl Progress for Loud {
+    fn status(&self, message: &str) {
+        println!("  {:.1} s {message}", self.0.elapsed().as_secs_f64());
+    }
+}
+
+fn report(name: &str, scenario: &Scenario, settings: &PointBased, episodes: usize) {
+    let begun = std::time::Instant::now();
+    let plan = solve(&scenario.model, settings, &Loud(begun)).unwrap();
+    let took = begun.elapsed().as_secs_f64();
+    println!(
+        "{name}: planned {:.4} in {took:.1} s, {} beliefs, {} vectors, converged {}",
+        plan.value,
+        plan.beliefs,
+        plan.policy.vectors().len(),
+        plan.converged
+    );
+    println!(
+        "  by vectors {:.4?}",
+        earned_by_vectors(scenario, &plan, episodes, false)
+    );
+    println!(
+        "  one look ahead {:.4?}",
+        earned_by_vectors(scenario, &plan, episodes / 5, true)
+    );
+    if let Some(graph) = &plan.graph {
+        let earned = earned_by_graph(scenario, graph, episodes);
+        println!(
+            "  graph: {} nodes, value {:.4}, earned {earned:.4?}",
+            graph.nodes.len(),
+            graph.value
+        );
+    }
+}
+
+#[test]
+#[ignore = "measures"]
+fn measure_binary_light() {
+    let cells = std::env::var("CELLS").unwrap_or("104 200 208".to_owned());
+    for cells in cells.split(' ').map(|cells| cells.parse().unwrap()) {
+        report(
+            &format!("binary {cells}"),
+            &binary_light(cells),
+            &PointBased::default(),
+            10_000,
+        );
+    }
+}
+
+#[test]
+#[ignore = "measures"]
+fn measure_built_in() {
+    let names = std::env::var("MODELS").unwrap_or("cart-load-unload corridor".to_owned());
+    for name in names.split(' ') {
+        report(name, &find(name).unwrap(), &PointBased::default(), 4000);
+    }
+}
