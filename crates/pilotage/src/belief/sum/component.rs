@@ -1,6 +1,10 @@
 //! One Gaussian of a sum: what is cut off it, what moves it, how it is halved.
 
-use crate::belief::gaussian::{normal_cdf, normal_density};
+use nalgebra::DMatrix;
+
+use crate::belief::gaussian::{
+    interval_probability, normal_cdf, normal_density, region_probability,
+};
 use crate::model::{Interval, ModeId, Region};
 
 /// A weighted Gaussian in a mode. Covariances may be singular: a point has none.
@@ -29,10 +33,26 @@ impl Component {
         self.covariance[variable * self.dim() + variable]
     }
 
+    /// Probability that it lies in a region.
+    pub(super) fn probability(&self, region: &Region) -> f64 {
+        if let [(variable, side)] = region.sides[..] {
+            return interval_probability(self.mean[variable], self.variance(variable), side);
+        }
+        match region.sides.is_empty() {
+            true => 1.0,
+            false => {
+                let n = self.dim();
+                let covariance = DMatrix::from_row_slice(n, n, &self.covariance);
+                region_probability(&self.mean, &covariance, region)
+            }
+        }
+    }
+
     /// The parts of it inside and outside a region, each with the moments of what is cut off there. One side of the region is cut after the
     /// other, what is left of other variables by regression.
     pub(super) fn cut(self, region: &Region) -> (Option<Self>, Vec<Self>) {
         let mut outside = Vec::new();
+        let whole = self.clone();
         let mut inside = self;
         for &(variable, side) in &region.sides {
             let (within, beyond) = inside.cut_side(variable, side);
@@ -40,6 +60,15 @@ impl Component {
             match within {
                 Some(within) => inside = within,
                 None => return (None, outside),
+            }
+        }
+        if region.sides.len() > 1 {
+            // What is left of a Gaussian is none, and the next side cuts off a little too much or too little of it.
+            let exact = whole.weight * whole.probability(region);
+            let beyond: f64 = outside.iter().map(|part| part.weight).sum();
+            inside.weight = exact;
+            for part in &mut outside {
+                part.weight *= (whole.weight - exact) / beyond;
             }
         }
         (Some(inside), outside)

@@ -11,6 +11,7 @@ mod bend;
 mod component;
 mod frame;
 mod line;
+mod motion;
 mod quadrature;
 mod readings;
 mod reduce;
@@ -58,6 +59,8 @@ pub struct SumKeeping {
     rule: Rule,
     /// For those that are less smooth.
     fine: Rule,
+    /// For noise beside a state that is not known either.
+    gusts: Rule,
     /// For posterior moments in 1, 2, ... coordinates.
     posterior: Vec<Rule>,
     /// The box in which a state can be, where walls without a map are known.
@@ -72,6 +75,9 @@ const COARSE: usize = 3;
 
 /// A standard deviation so many times smaller than the start's, or than a tenth of the bounds, counts as none.
 const CERTAIN: f64 = 1e-4;
+
+/// Variances that are none where numbers are whole.
+const NARROW: f64 = 1e-6;
 
 /// Most points that a start of whole numbers becomes.
 const MOST_POINTS: usize = 400;
@@ -101,6 +107,7 @@ impl SumKeeping {
             likeness: Likeness::new((0..n).map(floor).collect(), dynamics.kinds()),
             rule: Rule::new(n, if n == 1 { 9 } else { 5 }),
             fine: Rule::new(n, if n == 1 { 15 } else { 7 }),
+            gusts: Rule::cubature(n),
             posterior: (1..=n).map(posterior_rule).collect(),
             bounds: walled.map(|walls| walls.bounds.clone()),
             effects: EffectTable::new(model, |effects| effects),
@@ -249,8 +256,11 @@ impl Keeping for SumKeeping {
     }
 
     fn act(&self, full: &mut Sum, action: ActionId, step: usize) -> Acted {
+        let count = full.components.len();
         let acted = self.take(full, action, step);
-        self.likeness.reduce(&mut full.components, 2 * self.most);
+        if full.components.len() > count {
+            self.likeness.reduce(&mut full.components, 2 * self.most);
+        }
         acted
     }
 
@@ -317,7 +327,10 @@ impl Keeping for SumKeeping {
                 covariance: moments.covariance.clone(),
             })
             .collect();
-        for component in &mut components {
+        let n = self.dynamics.states();
+        // What is known exactly is known to be a whole number.
+        let narrow = (0..n).all(|i| moments.covariance[i * n + i] < NARROW);
+        for component in components.iter_mut().filter(|_| narrow) {
             self.dynamics.round_within(&mut component.mean);
         }
         normalise(&mut components);

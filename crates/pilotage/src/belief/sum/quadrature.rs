@@ -42,7 +42,16 @@ impl Rule {
         rule
     }
 
-    fn cubature(n: usize) -> Self {
+    /// The origin alone.
+    pub(super) fn point(n: usize) -> Self {
+        Self {
+            nodes: vec![vec![0.0; n]],
+            weights: vec![1.0],
+        }
+    }
+
+    /// The cubature rule of third degree: two points a variable.
+    pub(super) fn cubature(n: usize) -> Self {
         let far = (n as f64).sqrt();
         let along = |i: usize, x: f64| (0..n).map(|j| if i == j { x } else { 0.0 }).collect();
         let nodes: Vec<Vec<f64>> = (0..n)
