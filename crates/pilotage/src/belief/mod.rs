@@ -44,6 +44,6 @@ pub use reading::Reading;
 pub(crate) use recall::ClusterId;
 pub use recall::{Clusters, Recall};
 pub use space::{BeliefSpace, CodedSpace};
-pub use sum::{Sum, SumKeeping};
+pub use sum::{Component, Sum, SumKeeping};
 pub use tracker::{KalmanTracker, Tracker, Tracking};
 pub use updater::{Coded, Held, Updater};

@@ -165,8 +165,11 @@ impl SumKeeping {
             return of(&component.mean);
         }
         let mut at = component.mean.clone();
-        let nodes = self.posterior[frame.rank - 1].iter();
-        let each = nodes.map(|(z, weight)| {
+        let rule = match (frame.rank, component.dim()) {
+            (2, 2) => &self.fine,
+            (rank, _) => &self.posterior[rank - 1],
+        };
+        let each = rule.iter().map(|(z, weight)| {
             frame.place(z, &mut at);
             weight * of(&at)
         });

@@ -52,7 +52,7 @@ impl Component {
     /// other, what is left of other variables by regression.
     pub(super) fn cut(self, region: &Region) -> (Option<Self>, Vec<Self>) {
         let mut outside = Vec::new();
-        let whole = self.clone();
+        let whole = (region.sides.len() > 1).then(|| self.clone());
         let mut inside = self;
         for &(variable, side) in &region.sides {
             let (within, beyond) = inside.cut_side(variable, side);
@@ -62,7 +62,7 @@ impl Component {
                 None => return (None, outside),
             }
         }
-        if region.sides.len() > 1 {
+        if let Some(whole) = whole {
             // What is left of a Gaussian is none, and the next side cuts off a little too much or too little of it.
             let exact = whole.weight * whole.probability(region);
             let beyond: f64 = outside.iter().map(|part| part.weight).sum();

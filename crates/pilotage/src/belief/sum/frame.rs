@@ -23,7 +23,7 @@ pub(super) struct Inner {
 impl Inner {
     /// The standard normal of so many coordinates.
     pub(super) fn standard(r: usize) -> Self {
-        let one = |k: usize| if k % (r + 1) == 0 { 1.0 } else { 0.0 };
+        let one = |k: usize| f64::from(k.is_multiple_of(r + 1));
         Self {
             mean: vec![0.0; r],
             covariance: (0..r * r).map(one).collect(),

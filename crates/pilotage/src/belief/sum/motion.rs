@@ -209,7 +209,7 @@ impl SumKeeping {
         let one = Rule::point(n);
         let spread = root(&component.covariance, n);
         let states = if spread.iter().any(|entry| *entry > 0.0) {
-            &self.rule
+            &self.fine
         } else {
             &one
         };

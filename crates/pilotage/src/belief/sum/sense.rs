@@ -27,6 +27,9 @@ const LIGHT: f64 = 1e-3;
 /// Gaussians that fall behind the best by so many nats need not be looked at: they will be dropped.
 const HOPELESS: f64 = 20.0;
 
+/// Pieces that a Gaussian on a line may always become.
+const PIECES: usize = 4;
+
 /// Gaussians on their way through a reading.
 struct Passing {
     /// What has come out, with the logarithms of the weights.
@@ -36,7 +39,7 @@ struct Passing {
     best: f64,
     /// Room for a state.
     at: Vec<f64>,
-    /// Most parts that come out.
+    /// Parts up to which Gaussians are split.
     room: usize,
     /// Pieces that a Gaussian on a line may become.
     pieces: usize,
@@ -72,7 +75,7 @@ impl SumKeeping {
                 0
             },
             pieces: match self.splits {
-                true => (2 * self.most / count.max(1)).max(1),
+                true => (2 * self.most / count.max(1)).max(PIECES),
                 false => 1,
             },
         };
@@ -194,9 +197,7 @@ impl SumKeeping {
         guess: &Inner,
         passing: &mut Passing,
     ) {
-        let room = passing.room.saturating_sub(passing.parts.len());
-        let most = passing.pieces.min(room).max(1);
-        let (log, found) = pieces(sensor, frame, guess, most);
+        let (log, found) = pieces(sensor, frame, guess, passing.pieces);
         for (share, inner) in found {
             let mut piece = part.clone();
             frame.write(&inner, &mut piece);

@@ -110,10 +110,10 @@ impl<'a> Sensor<'a> {
         if self.m == 1 {
             return log_normal(read[0] - self.values[0], self.noise[0]);
         }
-        for r in 0..self.m {
+        for (r, (value, read)) in self.values.iter_mut().zip(read).enumerate() {
+            *value = read - *value;
             let variance = &mut self.noise[r * self.m + r];
             *variance = variance.max(LEAST);
-            self.values[r] = read[r] - self.values[r];
         }
         root_into(&self.noise, self.m, &mut self.root);
         whiten(&self.root, &mut self.values)

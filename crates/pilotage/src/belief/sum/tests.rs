@@ -6,11 +6,12 @@ use proptest::prelude::*;
 use super::component::Component;
 use super::reduce::Likeness;
 use super::{Sum, SumKeeping};
-use crate::belief::gaussian::interval_probability;
-use crate::belief::{KalmanFilter, Keeping, Moments, Reading};
+use crate::belief::gaussian::{interval_probability, normal_cdf, region_probability};
+use crate::belief::{KalmanFilter, Keeping, Moments, Reading, Sensed};
+use crate::model::map::draw;
 use crate::model::{
-    BeliefSettings, Case, Clause, Formula, Interval, Laws, ModelBuilder, MotionLaw, SensorLaw,
-    Then, TrackerKind, VariableKind, WallBelief,
+    BeliefSettings, Case, Clause, Formula, Interval, Laws, ModelBuilder, MotionLaw, Region,
+    SensorLaw, Then, TrackerKind, VariableKind, WallBelief,
 };
 use crate::random::{Role, normal, stream, uniform};
 
@@ -606,9 +607,9 @@ fn signals_and_silence_are_heard() {
     let keeping = SumKeeping::new(&model);
     let mut moved = keeping.start();
     keeping.act(&mut moved, RIGHT, 0);
-    let likely = |sensed: &crate::belief::Sensed, y: f64| match sensed {
-        crate::belief::Sensed::Symbol(0) => present(y) * bright(y),
-        crate::belief::Sensed::Symbol(_) => present(y) * (1.0 - bright(y)),
+    let likely = |sensed: &Sensed, y: f64| match sensed {
+        Sensed::Symbol(0) => present(y) * bright(y),
+        Sensed::Symbol(_) => present(y) * (1.0 - bright(y)),
         _ => 1.0 - present(y),
     };
     let readings = keeping.readings(&moved, RIGHT, 0, 10);
@@ -678,6 +679,211 @@ fn whole_numbers_are_points() {
     let found = moments(&keeping, &sum);
     assert!((found.mean[0] - mean).abs() < 0.02, "{found:?} {mean}");
     assert!((found.covariance[0] - (square - mean * mean)).abs() < 0.5);
+}
+
+/// A line without a sensor to speak of, on which one action is taken once.
+fn one_step(builder: ModelBuilder, covariance: f64) -> (SumKeeping, Sum, crate::belief::Acted) {
+    let model = builder
+        .variable("y", f64::NEG_INFINITY, f64::INFINITY)
+        .start(&[2.0], &[covariance])
+        .sensor(&[1.0], &[1.0])
+        .action("GO", &[1.0])
+        .belief(sums(Some(40)));
+    let keeping = SumKeeping::new(&model.build().unwrap());
+    let mut sum = keeping.start();
+    let acted = keeping.act(&mut sum, 0, 0);
+    (keeping, sum, acted)
+}
+
+#[test]
+fn formulas_are_paid_where_they_hold() {
+    let builder = ModelBuilder::new("paid", 0.9)
+        .motion(&[1.0], &[1.0], &[0.1])
+        .reward_of(
+            Formula::coded("square", |point| point.state[0].powi(2)),
+            Clause::new().within("y", 0.5, 3.0),
+        );
+    let (.., acted) = one_step(builder, 9.0);
+    let (_, _, all) = on_a_grid(0.5, 3.0 - 1e-9, |y| log_normal(y - 2.0, 9.0) + 2.0 * y.ln());
+    assert!(
+        (acted.reward / all.exp() - 1.0).abs() < 1e-3,
+        "{acted:?} {}",
+        all.exp()
+    );
+}
+
+#[test]
+fn a_motion_that_bends_splits_what_is_moved() {
+    let step = |y: f64| y + 2.0 * y.sin();
+    let noise = |y: f64| 0.01 + 0.1 * y.abs();
+    let law = MotionLaw {
+        step: vec![Some(Formula::coded("bent", move |point| {
+            step(point.state[0])
+        }))],
+        noise: Some(DMatrix::from_element(
+            1,
+            1,
+            Formula::coded("gusts", move |point| noise(point.state[0])),
+        )),
+        ..MotionLaw::default()
+    };
+    let builder = ModelBuilder::new("bent", 0.9)
+        .motion(&[1.0], &[1.0], &[0.1])
+        .reward(1.0, Clause::new())
+        .case(Case {
+            motion: law,
+            ..Case::default()
+        });
+    let (keeping, sum, _) = one_step(builder, 4.0);
+    assert!(sum.components().len() > 1);
+    let mut rng = stream(9, 0, Role::World);
+    let drawn = (0..400_000).map(|_| {
+        let y = 2.0 + 2.0 * normal(&mut rng);
+        [step(y) + noise(y).sqrt() * normal(&mut rng)]
+    });
+    let (mean, covariance) = drawn_moments(drawn);
+    let found = moments(&keeping, &sum);
+    assert_near(&found.mean, &mean, 0.05);
+    assert_near(&found.covariance, &covariance, 0.02 * covariance[0]);
+}
+
+#[test]
+fn a_reading_at_its_end_says_that_there_is_more() {
+    let mut model = light_dark_from_nowhere(40)
+        .start(&[2.0], &[9.0])
+        .build()
+        .unwrap();
+    model.laws.saturates = vec![Interval::new(0.0, 4.0)];
+    let keeping = SumKeeping::new(&model);
+    for reading in [4.0, 0.0, 2.0] {
+        let mut sum = keeping.start();
+        keeping.act(&mut sum, RIGHT, 0);
+        keeping.sense(&mut sum, RIGHT, 0, Reading::Values(&[reading]));
+        let found = moments(&keeping, &sum);
+        let (mean, sd, _) = on_a_grid(-21.0, 27.0, |y| {
+            let apart = reading - y;
+            log_normal(y - 3.0, 9.0)
+                + match reading {
+                    4.0 => normal_cdf(-apart / light(y)).ln(),
+                    0.0 => normal_cdf(apart / light(y)).ln(),
+                    _ => log_normal(apart, light(y).powi(2)),
+                }
+        });
+        assert!(
+            (found.mean[0] - mean).abs() < 0.02 * sd,
+            "{reading}: {found:?} {mean} {sd}"
+        );
+        assert!(
+            (found.covariance[0].sqrt() / sd - 1.0).abs() < 0.02,
+            "{reading}: {found:?} {sd}"
+        );
+    }
+    let mut sum = keeping.start();
+    keeping.act(&mut sum, RIGHT, 0);
+    let readings = keeping.readings(&sum, RIGHT, 0, 50);
+    let beyond = readings
+        .iter()
+        .filter(|(_, sensed)| *sensed == Sensed::Values(vec![4.0]));
+    assert!(beyond.count() > 5);
+}
+
+#[test]
+fn modes_that_are_seen_are_known() {
+    let builder = light_dark_from_nowhere(20)
+        .mode("calm")
+        .mode("windy")
+        .start_of(0.7, Some("calm"), &[2.0], &[9.0])
+        .start_of(0.3, Some("windy"), &[2.0], &[9.0]);
+    let mut model = builder.build().unwrap();
+    model.laws.modes_seen = true;
+    let keeping = SumKeeping::new(&model);
+    let mut sum = keeping.start();
+    keeping.act(&mut sum, RIGHT, 0);
+    let readings = keeping.readings(&sum, RIGHT, 0, 50);
+    let windy = readings.iter().filter(|(_, sensed)| match sensed {
+        Sensed::Values(values) => values.len() == 2 && values[1] == 1.0,
+        _ => false,
+    });
+    let windy: f64 = windy.map(|(likely, _)| likely).sum();
+    assert!((windy - 0.3).abs() < 0.03, "{windy}");
+    keeping.sense(&mut sum, RIGHT, 0, Reading::Values(&[3.0, 1.0]));
+    assert_eq!(moments(&keeping, &sum).weights, [0.0, 1.0]);
+}
+
+#[test]
+fn a_box_that_is_not_aligned_has_its_probability() {
+    let component = Component {
+        weight: 0.5,
+        mode: 0,
+        mean: vec![0.3, -0.2],
+        covariance: vec![1.0, 0.8, 0.8, 1.0],
+    };
+    let region = Region::new(vec![
+        (0, Interval::new(0.0, 1.0)),
+        (1, Interval::new(0.0, 1.0)),
+    ]);
+    let covariance = DMatrix::from_row_slice(2, 2, &component.covariance);
+    let exact = 0.5 * region_probability(&component.mean, &covariance, &region);
+    let (inside, outside) = component.cut(&region);
+    let inside = inside.map_or(0.0, |inside| inside.weight);
+    let outside: f64 = outside.iter().map(|part| part.weight).sum();
+    assert!((inside - exact).abs() < 1e-12, "{inside} {exact}");
+    assert!((inside + outside - 0.5).abs() < 1e-12);
+}
+
+/// A blocked cell in the way, of which some of the noise leads past.
+#[test]
+fn walls_of_a_map_stop_what_runs_into_them() {
+    let belief = BeliefSettings {
+        walls: WallBelief::Clip,
+        ..sums(None)
+    };
+    let mut model = ModelBuilder::new("cell", 0.9)
+        .variable("x", 0.0, 3.0)
+        .variable("y", 0.0, 3.0)
+        .start(&[0.5, 1.7], &[0.03, 0.0, 0.0, 0.05])
+        .motion(&[1.0, 0.0, 0.0, 1.0], &[1.0, 0.0], &[0.02, 0.0, 0.0, 0.02])
+        .sensor(&[1.0, 0.0], &[1.0])
+        .action("EAST", &[1.0])
+        .reward(1.0, Clause::new())
+        .belief(belief)
+        .build()
+        .unwrap();
+    let map = draw("...\n.#.\n...", 1.0).unwrap();
+    model.map = Some(map.clone());
+    let keeping = SumKeeping::new(&model);
+    let mut sum = keeping.start();
+    keeping.act(&mut sum, 0, 0);
+    let mut rng = stream(10, 0, Role::World);
+    let drawn = (0..200_000).map(|_| {
+        let mut noise = |variance: f64| variance.sqrt() * normal(&mut rng);
+        let from = map.nearest_free([0.5 + noise(0.03), 1.7 + noise(0.05)]);
+        let to = [from[0] + 1.0 + noise(0.02), from[1] + noise(0.02)];
+        map.travel(from, to)
+    });
+    let (mean, covariance) = drawn_moments(drawn);
+    let found = moments(&keeping, &sum);
+    assert_near(&found.mean, &mean, 0.05);
+    assert_near(&found.covariance, &covariance, 0.03);
+}
+
+/// Two angles on either side of the cut are near each other.
+#[test]
+fn angles_are_averaged_the_short_way() {
+    let likeness = Likeness::new(vec![1e-6], &[VariableKind::Angle]);
+    let at = |mean: f64| Component {
+        weight: 0.5,
+        mode: 0,
+        mean: vec![mean],
+        covariance: vec![0.01],
+    };
+    let mut one = at(3.1);
+    likeness.merge(&mut one, &at(-3.1));
+    assert!(
+        (one.mean[0].abs() - std::f64::consts::PI).abs() < 1e-9,
+        "{one:?}"
+    );
+    assert!(one.covariance[0] < 0.012, "{one:?}");
 }
 
 proptest! {
