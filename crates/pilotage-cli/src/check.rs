@@ -134,14 +134,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             )?;
         }
     }
+    // Solvers that refuse for the same reason are named together.
+    let mut refusals: Vec<(Vec<&str>, String)> = Vec::new();
     for solver in registry.entries() {
-        match solver.accepts(&model) {
-            Ok(()) => writeln!(out, "  {:<15} can solve it", solver.name())?,
-            Err(Error::Unsupported { reason, .. }) => {
-                writeln!(out, "  {:<15} cannot: {reason}", solver.name())?;
+        let reason = match solver.accepts(&model) {
+            Ok(()) => {
+                writeln!(out, "  {:<15} can solve it", solver.name())?;
+                continue;
             }
-            Err(error) => writeln!(out, "  {:<15} cannot: {error}", solver.name())?,
+            Err(Error::Unsupported { reason, .. }) => reason,
+            Err(error) => error.to_string(),
+        };
+        match refusals.iter_mut().find(|(_, known)| *known == reason) {
+            Some((solvers, _)) => solvers.push(solver.name()),
+            None => refusals.push((vec![solver.name()], reason)),
         }
+    }
+    for (solvers, reason) in refusals {
+        writeln!(out, "  {:<15} cannot: {reason}", solvers.join(", "))?;
     }
     Ok(())
 }
@@ -181,14 +191,13 @@ impl Levels {
 
 /// What keeps the belief of a model, and why.
 fn belief(model: &Model) -> String {
-    let chosen = match model.belief.tracker {
-        TrackerKind::Auto => {
-            let reasons = model.beyond_levels();
-            match reasons.is_empty() {
-                true => "nothing about state and mode is lost by it".to_owned(),
-                false => format!("because of {}", reasons.join(", ")),
-            }
-        }
+    let lost = model.beyond_levels().join(", ");
+    let chosen = match (model.tracker(), model.belief.tracker) {
+        (TrackerKind::Linear, _) if lost.is_empty() => "exact".to_owned(),
+        (TrackerKind::Linear, _) => format!(
+            "which loses something of {lost}; `tracker = \"sum\"` in [belief] keeps it, for codebook"
+        ),
+        (_, TrackerKind::Auto) => format!("because of {lost}"),
         _ => "as [belief] says".to_owned(),
     };
     let kind = match model.tracker() {

@@ -258,7 +258,7 @@ fn what_cannot_be_done_is_one_message() {
         (&["solve", "corridor", "--episodes", "0"], "at least 1"),
         (
             &["solve", "corridor", "--with", "kafaq", "--grid", "41"],
-            "--grid is for --with value-iteration or --with qmdp or --with mls; kafaq has the settings `",
+            "--grid is for --with value-iteration or --with qmdp or --with mls or --with codebook; kafaq has the settings `",
         ),
         (
             &["solve", "corridor", "--set", "lambda=0.5"],

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{short, small};
-use pilotage::belief::{Belief, BeliefMdp};
+use pilotage::belief::Belief;
 use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario, Truth};
 use pilotage::solve::{Form, Registry, Solution, Solved, solve};
@@ -111,9 +111,9 @@ fn text_of(scenario: &Scenario, solution: &Solution) -> String {
     let plan = match &solution.policy {
         Solved::Automaton(automaton) => automaton.to_json().unwrap(),
         Solved::Control(_) => panic!("none of these models has a cost"),
-        Solved::Rule { policy, .. } => {
+        Solved::Rule { policy, updater } => {
             let model = &scenario.model;
-            let levels = BeliefMdp::new(model).strata();
+            let levels = updater.space(model).strata();
             let at = |k: usize| {
                 let share = k as f64 / 10.0;
                 let mean = |bounds: pilotage::model::Interval| bounds.low + share * bounds.width();

@@ -202,7 +202,7 @@ const MISTAKES: &[Mistake] = &[
     // A rule of thumb.
     row("thermostat", "do = \"HEAT\"", "do = \"HEET\"", "\"HEET\"", "unknown action `HEET`", "`HEAT`"),
     row("thermostat", "when = \"temperature <", "when = \"temperatur <", "temperatur <", "unknown name `temperatur`", "`temperature`"),
-    row("thermostat", "p_home > 0.4", "p_hom > 0.4", "p_hom >", "unknown name `p_hom`", "`p_home`"),
+    row("thermostat", "p_home > 0.2", "p_hom > 0.2", "p_hom >", "unknown name `p_hom`", "`p_home`"),
     row("thermostat", "do = \"HEAT\"\n", "do = \"HEAT\"\nif = 3\n", "if = 3", "unknown key `if`", "`when`"),
     row("thermostat", "[[rule]]\ndo = \"OFF\"", "", "when = \"temperature <", "nothing is said of what to do", "without `when`"),
     row("thermostat", "[[rule]]\ndo = \"OFF\"", "[[rule]]\ndo = \"OFF\"\n[[rule]]\ndo = \"HEAT\"", "[[rule]]\ndo = \"OFF\"", "never asked", "condition"),

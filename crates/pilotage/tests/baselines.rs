@@ -54,6 +54,7 @@ fn turning() -> Model {
     model.start[0].covariance = dmatrix![0.5, 0.2; 0.2, 0.4];
     model.motion.a = dmatrix![0.9, 0.4; -0.4, 1.0];
     model.motion.b = dmatrix![1.0, 0.0; 0.3, 0.5];
+    model.motion.drift = dvector![0.0, 0.0];
     model.motion.noise = dmatrix![0.2, 0.05; 0.05, 0.1];
     model.sensor.h = dmatrix![1.0, 0.5];
     model.sensor.noise = dmatrix![0.3];

@@ -31,7 +31,7 @@ const MODES: f64 = 2.0;
 const CERTAIN: f64 = 1e-3;
 
 /// A belief lies between so many strata.
-pub const BETWEEN: usize = 4;
+const BETWEEN: usize = 4;
 
 impl Stratum {
     /// The mode that is most likely, the first of several.

@@ -12,6 +12,8 @@ use crate::error::Result;
 use crate::model::{ActionId, Model, ModelText, TrackerKind};
 
 /// Keeps beliefs, and reads them as a stratum, a mode and a mean. It does not change: what changes is a [`Held`] belief.
+// There are few at a time, so their size does not matter.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Updater {
     /// The Kalman filter on uncertainty levels.

@@ -360,7 +360,7 @@ impl Default for BeliefSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum TrackerKind {
-    /// What the model asks for: `linear` where one Gaussian is exact, `sum` elsewhere, `cells` for a discrete sensor.
+    /// What the model asks for: `linear` for a linear model, `cells` for a discrete sensor, `sum` elsewhere.
     #[default]
     Auto,
     /// The Kalman filter on uncertainty levels, at one believed mode.
@@ -510,11 +510,11 @@ impl Model {
         said.map(|(_, part)| part).collect()
     }
 
-    /// What keeps its belief: what [`BeliefSettings::tracker`] says or, by itself, the Kalman filter wherever nothing about state and mode is
-    /// lost by it, cells for a discrete sensor, and a sum of Gaussians elsewhere.
+    /// What keeps its belief: what [`BeliefSettings::tracker`] says or, by itself, the Kalman filter for a linear model, cells for a discrete
+    /// sensor, and a sum of Gaussians elsewhere. What the filter loses of a linear model, [`Model::beyond_levels`] says.
     pub fn tracker(&self) -> TrackerKind {
         match self.belief.tracker {
-            TrackerKind::Auto if self.beyond_levels().is_empty() => TrackerKind::Linear,
+            TrackerKind::Auto if self.is_linear() => TrackerKind::Linear,
             TrackerKind::Auto if !self.laws.symbols.is_empty() => TrackerKind::Cells,
             TrackerKind::Auto => TrackerKind::Sum,
             chosen => chosen,

@@ -51,7 +51,10 @@ impl fmt::Display for Fault {
             Step::Key(key) => path.key(key),
             Step::Index(index) => path.index(*index),
         });
-        write!(f, "{path}: {}", self.message)
+        match self.place.is_empty() {
+            true => write!(f, "{}", self.message),
+            false => write!(f, "{path}: {}", self.message),
+        }
     }
 }
 
@@ -140,19 +143,21 @@ impl PolicyTable {
         names(&self.actions).at("actions")?;
         some(&self.modes).at("modes")?;
         each(&self.modes, |name| plain(name)).at("modes")?;
+        match (&self.filter, &self.start, &self.belief) {
+            (Some(filter), Some(_), None) => filter.check(&sizes).at("filter")?,
+            (None, None, Some(belief)) => belief.check(&sizes).at("belief")?,
+            (None, _, None) => {
+                return Err(Fault::new("missing field `filter`, or else `belief`"));
+            }
+            (Some(_), None, None) => return Err(Fault::new("missing field `start`")),
+            (_, _, Some(_)) => {
+                return Err(Fault::new("`filter` and `start` do not go with `belief`"));
+            }
+        }
         if let Some(start) = &self.start {
             sizes.level(start.level).at("level").at("start")?;
             sizes.mode(&start.mode).at("mode").at("start")?;
             vector(&start.mean, sizes.states).at("mean").at("start")?;
-        }
-        match (&self.filter, &self.start, &self.belief) {
-            (Some(filter), Some(_), None) => filter.check(&sizes).at("filter")?,
-            (None, None, Some(belief)) => belief.check(&sizes).at("belief")?,
-            _ => {
-                return Err(Fault::new(
-                    "either `filter` and `start`, or `belief` and neither of them".to_owned(),
-                ));
-            }
         }
         if let Some(memory) = &self.memory {
             memory.check(&sizes).at("memory")?;

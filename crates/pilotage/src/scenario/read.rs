@@ -38,7 +38,7 @@ pub fn read(text: &str, origin: &str) -> Result<Scenario, ModelError> {
             .and_then(ModelFile::deserialize)
             .map_err(|error| in_our_words(&error))?;
         let mut scenario = resolve(file).map_err(|fault| placed(text, fault))?;
-        scenario.model.text = ModelText(Some(text.into()));
+        scenario.model.text = ModelText(Some(own_text(text).into()));
         Ok(scenario)
     };
     parse().map_err(|(span, message, hint)| ModelError {
@@ -75,6 +75,30 @@ pub fn load(path: &Path) -> Result<Scenario, ModelError> {
         }
     })?;
     read(&text, &origin)
+}
+
+/// The text without the tables of what is true and of rules of thumb, which no policy depends on.
+fn own_text(text: &str) -> String {
+    let foreign = |header: &str| {
+        let name = header.trim_start_matches('[').trim_start();
+        ["world", "rule"].iter().any(|table| {
+            let rest = name.strip_prefix(table);
+            rest.is_some_and(|rest| rest.trim_start().starts_with(['.', ']']))
+        })
+    };
+    let mut skips = false;
+    let mut kept = String::with_capacity(text.len());
+    for line in text.split_inclusive('\n') {
+        if line.starts_with('[') {
+            skips = foreign(line);
+        }
+        if !skips {
+            kept.push_str(line);
+        }
+    }
+    kept.truncate(kept.trim_end().len());
+    kept.push('\n');
+    kept
 }
 
 fn placed(text: &str, fault: Fault) -> (std::ops::Range<usize>, String, String) {

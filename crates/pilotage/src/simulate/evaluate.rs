@@ -107,7 +107,7 @@ pub fn evaluate(
 
 /// Runs agents in the scenario's world, each made anew for a number of episodes. The same numbers for any number of threads.
 pub fn evaluate_agent<'a>(
-    scenario: &'a Scenario,
+    scenario: &Scenario,
     agent: &(dyn Fn() -> Box<dyn Agent + 'a> + Sync),
     options: Options,
     observer: &dyn Progress,

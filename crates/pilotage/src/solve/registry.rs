@@ -8,11 +8,6 @@ use crate::model::{Model, suggest};
 
 /// Every solver of the library, the first that accepts a model being the one to try first.
 const BUILTIN: [Entry; 9] = [
-    Entry::planner::<CodebookPlanner>(
-        "codebook",
-        &[],
-        "value iteration on strata and means of beliefs of any kind",
-    ),
     Entry::planner::<ValueIteration>(
         "value-iteration",
         &["kbvi-closed"],
@@ -39,6 +34,11 @@ const BUILTIN: [Entry; 9] = [
         "acts as if all uncertainty were gone after this step",
     ),
     Entry::planner::<Mls>("mls", &[], "acts as if the most likely state were certain"),
+    Entry::planner::<CodebookPlanner>(
+        "codebook",
+        &[],
+        "value iteration on strata and means of beliefs of any kind",
+    ),
     Entry::learner::<Kafaq>(
         "kafaq",
         &[],

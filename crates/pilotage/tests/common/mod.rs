@@ -154,6 +154,7 @@ pub fn least_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
 /// A solver with settings small enough for a test of all of them; what is found need not be good.
 pub fn small(entry: &Entry, model: &Model) -> Solver {
     let points = match model.state_dim() {
+        _ if entry.name() == "codebook" => "5",
         1 => "161",
         2 => "31",
         _ => "3",
@@ -175,6 +176,11 @@ pub fn small(entry: &Entry, model: &Model) -> Solver {
         ("epoch_per_entry", "1"),
         ("epoch_limit", "2"),
         ("trial", "10"),
+        ("strata", "4"),
+        ("readings", "3"),
+        ("rounds", "1"),
+        ("episodes", "5"),
+        ("refined", "20"),
     ];
     let known = entry.settings();
     let has = |name: &str| known.iter().any(|info| info.name == name);

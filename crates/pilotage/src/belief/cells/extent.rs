@@ -35,7 +35,7 @@ pub(super) fn grid(model: &Model, dynamics: &Dynamics) -> Result<Grid> {
         .map(|i| axis(model, i, extent(model, dynamics, i), count))
         .collect();
     let all = axes.iter().map(|axis| axis.count as f64).product::<f64>();
-    if !(all <= MOST as f64) {
+    if all > MOST as f64 || all.is_nan() {
         return Err(unsupported(
             model,
             format!(

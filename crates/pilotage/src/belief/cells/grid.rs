@@ -61,7 +61,7 @@ impl Ramp {
 
     /// Probability of being below `x`: the integral of the normal cdf is `z cdf(z) + density(z)`.
     fn below(&self, x: f64) -> f64 {
-        if x == f64::NEG_INFINITY || x == f64::INFINITY {
+        if x.is_infinite() {
             return f64::from(x > 0.0);
         }
         let width = self.high - self.low;

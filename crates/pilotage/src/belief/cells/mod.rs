@@ -45,7 +45,7 @@ impl Cells {
     /// Makes masses probabilities; `false` if there is none, and nothing is changed.
     fn normalise(&mut self) -> bool {
         let sum: f64 = self.mass.iter().sum();
-        if !(sum > 0.0) {
+        if sum <= 0.0 || sum.is_nan() {
             return false;
         }
         self.mass.iter_mut().for_each(|mass| *mass /= sum);

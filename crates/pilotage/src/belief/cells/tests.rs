@@ -1,7 +1,7 @@
 use super::*;
 use crate::belief::KalmanFilter;
 use crate::belief::full::Keeping;
-use crate::model::{BeliefSettings, Clause, Formula, ModelBuilder, Then, WallBelief};
+use crate::model::{BeliefSettings, Clause, Formula, ModelBuilder, Then};
 use nalgebra::{DMatrix, DVector};
 
 fn hallway(cells: Option<usize>) -> Model {
@@ -187,56 +187,6 @@ fn what_ends_restarts_and_goes_on_is_all_there_is() {
                 .map(product)
                 .sum();
             assert!((ahead - behind).abs() < 1e-12);
-        }
-    }
-}
-
-/// The step of a world of many states, event by event, against the sums over cells. Standard errors of 2e5 draws are below a quarter of what is allowed.
-#[test]
-fn a_step_of_cells_is_what_the_world_does() {
-    use crate::scenario::Scenario;
-    use crate::world::{Observation, ProblemWorld, Streams, World};
-    const DRAWS: usize = 200_000;
-    for walls in [WallBelief::Ignore, WallBelief::Clip] {
-        let mut model = eventful();
-        model.belief.walls = walls;
-        model.belief.cells = Some(400);
-        let keeping = CellsKeeping::new(&model).unwrap();
-        let mut world = ProblemWorld::new(&Scenario::assumed(&model));
-        let mut draws = Streams::new(7, 0);
-        let mut observation = Observation::new(1);
-        for action in 0..2 {
-            let (mut reward, mut ended, mut restarted, mut loaded, mut sum) =
-                (0.0, 0.0, 0.0, 0.0, 0.0);
-            for _ in 0..DRAWS {
-                world.reset(&mut draws);
-                let step = world.step(action, &mut draws, &mut observation);
-                reward += step.reward / DRAWS as f64;
-                match step.then {
-                    Then::End => ended += 1.0 / DRAWS as f64,
-                    Then::Restart => restarted += 1.0 / DRAWS as f64,
-                    Then::Continue => {
-                        loaded += world.mode() as f64 / DRAWS as f64;
-                        sum += world.state()[0] / DRAWS as f64;
-                    }
-                }
-            }
-            let mut full = keeping.start();
-            let acted = keeping.act(&mut full, action, 0);
-            let moments = moments(&keeping, &full);
-            let left = 1.0 - acted.ended - acted.restarted;
-            for (name, drawn, kept, within) in [
-                ("reward", reward, acted.reward, 0.03),
-                ("ended", ended, acted.ended, 0.004),
-                ("restarted", restarted, acted.restarted, 0.004),
-                ("loaded", loaded, left * moments.weights[1], 0.004),
-                ("mean", sum, left * moments.mean[0], 0.012),
-            ] {
-                assert!(
-                    (drawn - kept).abs() < within,
-                    "{walls:?} {action} {name}: {drawn} {kept}"
-                );
-            }
         }
     }
 }

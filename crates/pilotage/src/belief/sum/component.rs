@@ -20,6 +20,9 @@ pub struct Component {
     pub covariance: Vec<f64>,
 }
 
+/// A bound is run against by at least this share, or by nobody.
+const RARE: f64 = 1e-3;
+
 /// Less likely parts are left out.
 const NOTHING: f64 = 1e-9;
 
@@ -166,7 +169,13 @@ impl Component {
             }
             let before = std::mem::take(&mut parts);
             for part in before {
-                let (inside, beyond) = part.cut_side(variable, *side);
+                let whole = part.weight;
+                let (mut inside, mut beyond) = part.cut_side(variable, *side);
+                // What hardly ever happens is left out, and its weight kept.
+                beyond.retain(|part| part.weight > RARE * whole || inside.is_none());
+                if let Some(inside) = &mut inside {
+                    inside.weight = whole - beyond.iter().map(|part| part.weight).sum::<f64>();
+                }
                 parts.extend(inside);
                 for mut part in beyond {
                     let at = side.clamp(part.mean[variable]);

@@ -67,6 +67,9 @@ pub struct SumKeeping {
     bounds: Option<Vec<Interval>>,
 }
 
+/// Gaussians of a mode where only walls, modes and starts make more than one of it, unless the model says how many.
+const FEW: usize = 4;
+
 /// Gaussians of a sum, unless the model says how many.
 const COMPONENTS: usize = 16;
 
@@ -86,7 +89,8 @@ const MOST_POINTS: usize = 400;
 const SLICES: usize = 8;
 
 impl SumKeeping {
-    /// Sums of Gaussians for a model, of as many as [`crate::model::BeliefSettings::components`] says: by itself 16.
+    /// Sums of Gaussians for a model, of as many as [`crate::model::BeliefSettings::components`] says: by itself 16, or 4 a
+    /// mode where motion and sensor are linear.
     pub fn new(model: &Model) -> Self {
         let n = model.state_dim();
         let dynamics = Dynamics::new(model);
@@ -102,7 +106,10 @@ impl SumKeeping {
             start: Sum {
                 components: Vec::new(),
             },
-            most: model.belief.components.unwrap_or(COMPONENTS),
+            most: model.belief.components.unwrap_or(match model.is_linear() {
+                true => COMPONENTS.min(FEW * model.modes.len()),
+                false => COMPONENTS,
+            }),
             splits: true,
             likeness: Likeness::new((0..n).map(floor).collect(), dynamics.kinds()),
             rule: Rule::new(n, if n == 1 { 9 } else { 5 }),

@@ -122,6 +122,12 @@ pub fn bound(model: &Model, settings: &Settings, observer: &dyn Progress) -> Res
             reason: reason.to_owned(),
         })
     };
+    if !model.is_linear() {
+        return refuse(&format!(
+            "it has {}, and bounds are known for linear models alone; leave out --bound",
+            model.beyond_linear().join(", ")
+        ));
+    }
     if model.cost.is_some() {
         return refuse(
             "it has a quadratic cost, which is not bounded; the value that lqg plans is the best there is",

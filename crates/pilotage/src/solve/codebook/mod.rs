@@ -42,9 +42,9 @@ const SOLVER: &str = "codebook";
 /// The planner on a codebook of strata.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CodebookPlanner {
-    /// Most strata; 1 to 1000.
+    /// Most strata; at least 1, at most 1000.
     pub strata: usize,
-    /// How far apart strata are at least, in units of the logarithm of a standard deviation; above 0.
+    /// How far apart strata are at least, in units of the logarithm of a standard deviation; more than 0.
     pub apart: f64,
     /// Points of the grid of means along each variable; at least 2, or `auto` for what suits the number of variables.
     pub points: Option<usize>,
@@ -52,11 +52,11 @@ pub struct CodebookPlanner {
     pub readings: usize,
     /// Times that the plan is refined on the beliefs that it meets; at least 1.
     pub rounds: usize,
-    /// Episodes that are run to meet beliefs in a round; 1 to a million.
+    /// Episodes that are run to meet beliefs in a round; at least 1, at most a million.
     pub episodes: usize,
-    /// Most beliefs in full that a round refines on.
+    /// Most beliefs in full that a round refines on; at least 0.
     pub refined: usize,
-    /// Largest change of a value in the last sweep, as a share of the largest value; above 0.
+    /// Largest change of a value in the last sweep, as a share of the largest value; more than 0.
     pub tolerance: f64,
 }
 
@@ -100,7 +100,7 @@ impl Settings for CodebookPlanner {
 pub fn accepts(model: &Model) -> Result<()> {
     let exact = || {
         (model.tracker() == TrackerKind::Linear).then(|| {
-            "one Gaussian on uncertainty levels is its belief; use value-iteration, or write `tracker = \"sum\"` in [belief]".to_owned()
+            "its belief is one Gaussian on uncertainty levels; use value-iteration, or write `tracker = \"sum\"` in [belief]".to_owned()
         })
     };
     let reason = refusals::reward_missing(model)
@@ -172,7 +172,7 @@ impl CodebookPlanner {
             let shared = Arc::new(codebook.clone());
             let updater = updater(Coded::new(model, Arc::clone(&keeping), Arc::clone(&shared)));
             let options = Options {
-                episodes: TRIALS,
+                episodes: TRIALS * self.episodes,
                 seed: seed.wrapping_add(1),
             };
             let assumed = Scenario::assumed(model);
@@ -223,7 +223,7 @@ impl CodebookPlanner {
     fn grid(&self, model: &Model, met: &[Moments]) -> super::grid::Grid {
         let n = model.state_dim();
         let points = self.points.unwrap_or(match n {
-            1 => 401,
+            1 => 201,
             2 => 33,
             3 => 15,
             _ => 9,
@@ -248,5 +248,5 @@ impl CodebookPlanner {
     }
 }
 
-/// Episodes by which the rounds are compared.
-const TRIALS: usize = 2000;
+/// Rounds are compared by so many times as many episodes as beliefs are met in.
+const TRIALS: usize = 5;

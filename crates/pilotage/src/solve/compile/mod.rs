@@ -69,7 +69,9 @@ impl Settings {
         };
         match (self.nodes, self.loss) {
             (Some(nodes), _) if nodes == 0 => fail("nodes", nodes.to_string(), "at least 1"),
-            (_, Some(loss)) if !(loss >= 0.0) => fail("loss", loss.to_string(), "at least 0"),
+            (_, Some(loss)) if loss < 0.0 || loss.is_nan() => {
+                fail("loss", loss.to_string(), "at least 0")
+            }
             (Some(nodes), _) if self.matching != Matching::Tree => {
                 fail("nodes", nodes.to_string(), "for the form tree alone")
             }

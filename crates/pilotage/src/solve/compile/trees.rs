@@ -114,7 +114,7 @@ pub(super) fn grow(
         grown.write(&mut tree, &collected, &features, policy);
         tree
     };
-    *automaton = smallest(space, size, seed, &of_size);
+    *automaton = smallest(space, size, (episodes.min(TRIALS), seed), &of_size);
 }
 
 /// The smallest tree that earns hardly less than the best, in the same episodes of the world that the model assumes: what a plan says of its
@@ -122,12 +122,12 @@ pub(super) fn grow(
 fn smallest(
     space: &dyn BeliefSpace,
     size: Size,
-    seed: u64,
+    (episodes, seed): (usize, u64),
     of_size: &dyn Fn(usize) -> Automaton,
 ) -> Automaton {
     let assumed = Scenario::assumed(space.model());
     let options = Options {
-        episodes: TRIALS,
+        episodes,
         seed: seed.wrapping_add(ROUNDS as u64),
     };
     let mut tried: Vec<(f64, Automaton)> = Vec::new();
@@ -178,7 +178,7 @@ fn sizes(most: usize) -> Vec<usize> {
     sizes
 }
 
-/// Episodes by which trees are compared.
+/// Most episodes by which trees are compared.
 const TRIALS: usize = 2000;
 
 /// Trees that may be no better than those before, one after the other, until no larger one is tried.

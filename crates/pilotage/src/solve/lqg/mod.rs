@@ -66,7 +66,8 @@ impl Planner for Lqg {
     fn accepts(&self, model: &Model) -> Result<()> {
         let reason = use_of(model)
             .err()
-            .or_else(|| refusals::steps_differ(model));
+            .or_else(|| refusals::steps_differ(model))
+            .or_else(|| refusals::drifts(model));
         refuse_if(SOLVER, model, reason)
     }
 

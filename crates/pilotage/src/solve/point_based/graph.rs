@@ -5,6 +5,7 @@
 //! - S. Ji, R. Parr, H. Li, X. Liao and L. Carin, "Point-based policy iteration", 2007: graphs by backups at beliefs.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
 use super::backup::{Backup, Choice};
@@ -80,8 +81,8 @@ fn reached(backup: &Backup, set: &VectorSet) -> Vec<Made> {
     let mut asked = 0;
     while asked < found.len() {
         for pick in found[asked].0.picks.clone() {
-            if !numbers.contains_key(&pick) {
-                numbers.insert(pick, found.len());
+            if let Entry::Vacant(entry) = numbers.entry(pick) {
+                entry.insert(found.len());
                 found.push(at_witness(backup, set, pick));
             }
         }

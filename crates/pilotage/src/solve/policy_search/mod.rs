@@ -47,7 +47,9 @@ impl Planner for PolicySearch {
 
     fn accepts(&self, model: &Model) -> Result<()> {
         let mdp = BeliefMdp::new(model);
-        let reason = refusals::steps_differ(model).or_else(|| refusal(&mdp, self.aim(model)));
+        let reason = refusals::steps_differ(model)
+            .or_else(|| refusals::drifts(model))
+            .or_else(|| refusal(&mdp, self.aim(model)));
         refuse_if(SOLVER, model, reason)
     }
 
