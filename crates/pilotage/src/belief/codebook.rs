@@ -162,7 +162,7 @@ impl Codebook {
         best.0
     }
 
-    /// The strata that a belief lies between, at most [`BETWEEN`], with weights that sum to 1: the inverse of their distances.
+    /// The strata that a belief lies between, at most four, with weights that sum to 1: the inverse of their distances.
     pub fn between(&self, moments: &Moments, code: &mut Vec<f64>) -> Vec<(StratumId, f64)> {
         self.write_code(moments, code);
         let mut near: Vec<(StratumId, f64)> = Vec::with_capacity(BETWEEN + 1);

@@ -143,6 +143,11 @@ impl PolicyTable {
         names(&self.actions).at("actions")?;
         some(&self.modes).at("modes")?;
         each(&self.modes, |name| plain(name)).at("modes")?;
+        if let (Some(start), Some(_)) = (&self.start, &self.filter) {
+            sizes.level(start.level).at("level").at("start")?;
+            sizes.mode(&start.mode).at("mode").at("start")?;
+            vector(&start.mean, sizes.states).at("mean").at("start")?;
+        }
         match (&self.filter, &self.start, &self.belief) {
             (Some(filter), Some(_), None) => filter.check(&sizes).at("filter")?,
             (None, None, Some(belief)) => belief.check(&sizes).at("belief")?,
@@ -153,11 +158,6 @@ impl PolicyTable {
             (_, _, Some(_)) => {
                 return Err(Fault::new("`filter` and `start` do not go with `belief`"));
             }
-        }
-        if let Some(start) = &self.start {
-            sizes.level(start.level).at("level").at("start")?;
-            sizes.mode(&start.mode).at("mode").at("start")?;
-            vector(&start.mean, sizes.states).at("mean").at("start")?;
         }
         if let Some(memory) = &self.memory {
             memory.check(&sizes).at("memory")?;
