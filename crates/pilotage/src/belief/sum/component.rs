@@ -1,6 +1,10 @@
 //! One Gaussian of a sum: what is cut off it, what moves it, how it is halved.
 
-use crate::belief::gaussian::{normal_cdf, normal_density};
+use nalgebra::DMatrix;
+
+use crate::belief::gaussian::{
+    interval_probability, normal_cdf, normal_density, region_probability,
+};
 use crate::model::{Interval, ModeId, Region};
 
 /// A weighted Gaussian in a mode. Covariances may be singular: a point has none.
@@ -35,10 +39,26 @@ impl Component {
         self.covariance[variable * self.dim() + variable]
     }
 
+    /// Probability that it lies in a region.
+    pub(super) fn probability(&self, region: &Region) -> f64 {
+        if let [(variable, side)] = region.sides[..] {
+            return interval_probability(self.mean[variable], self.variance(variable), side);
+        }
+        match region.sides.is_empty() {
+            true => 1.0,
+            false => {
+                let n = self.dim();
+                let covariance = DMatrix::from_row_slice(n, n, &self.covariance);
+                region_probability(&self.mean, &covariance, region)
+            }
+        }
+    }
+
     /// The parts of it inside and outside a region, each with the moments of what is cut off there. One side of the region is cut after the
     /// other, what is left of other variables by regression.
     pub(super) fn cut(self, region: &Region) -> (Option<Self>, Vec<Self>) {
         let mut outside = Vec::new();
+        let whole = (region.sides.len() > 1).then(|| self.clone());
         let mut inside = self;
         for &(variable, side) in &region.sides {
             let (within, beyond) = inside.cut_side(variable, side);
@@ -46,6 +66,15 @@ impl Component {
             match within {
                 Some(within) => inside = within,
                 None => return (None, outside),
+            }
+        }
+        if let Some(whole) = whole {
+            // What is left of a Gaussian is none, and the next side cuts off a little too much or too little of it.
+            let exact = whole.weight * whole.probability(region);
+            let beyond: f64 = outside.iter().map(|part| part.weight).sum();
+            inside.weight = exact;
+            for part in &mut outside {
+                part.weight *= (whole.weight - exact) / beyond;
             }
         }
         (Some(inside), outside)
@@ -204,33 +233,5 @@ impl Component {
             part
         };
         [at(-1.0, OUTER), at(0.0, 1.0 - 2.0 * OUTER), at(1.0, OUTER)]
-    }
-}
-
-/// Lower triangular root of a covariance, row by row; 0 along directions without any variance.
-pub(super) fn root(covariance: &[f64], n: usize) -> Vec<f64> {
-    let mut root = vec![0.0; n * n];
-    let scale = (0..n).fold(0.0, |most: f64, i| most.max(covariance[i * n + i]));
-    for j in 0..n {
-        let before: f64 = (0..j).map(|k| root[j * n + k] * root[j * n + k]).sum();
-        let pivot = covariance[j * n + j] - before;
-        if pivot <= 1e-14 * scale || pivot <= 0.0 {
-            continue;
-        }
-        let pivot = pivot.sqrt();
-        root[j * n + j] = pivot;
-        for i in j + 1..n {
-            let shared: f64 = (0..j).map(|k| root[i * n + k] * root[j * n + k]).sum();
-            root[i * n + j] = (covariance[i * n + j] - shared) / pivot;
-        }
-    }
-    root
-}
-
-/// Writes `mean + root z`.
-pub(super) fn place(mean: &[f64], root: &[f64], z: &[f64], to: &mut [f64]) {
-    let n = mean.len();
-    for i in 0..n {
-        to[i] = mean[i] + (0..=i).map(|k| root[i * n + k] * z[k]).sum::<f64>();
     }
 }

@@ -6,15 +6,24 @@
 //! and covariance stay.
 
 mod act;
+mod adapt;
+mod bend;
 mod component;
+mod frame;
+mod line;
+mod motion;
 mod quadrature;
 mod readings;
 mod reduce;
+mod regression;
 mod sense;
+mod sensor;
+#[cfg(test)]
+mod tests;
 
 pub use component::Component;
 use quadrature::Rule;
-use reduce::{normalise, reduce};
+use reduce::{Likeness, normalise};
 
 use super::full::{Acted, Keeping, Moments, Sensed};
 use super::reading::Reading;
@@ -43,14 +52,17 @@ pub struct SumKeeping {
     effects: EffectTable,
     start: Sum,
     most: usize,
-    /// Whether Gaussians that are too wide for their sensor are split.
+    /// Whether a Gaussian that is too wide for its sensor may become several.
     splits: bool,
-    /// Standard deviations that count as none, length `n`.
-    floors: Vec<f64>,
+    likeness: Likeness,
     /// For expectations of smooth functions.
     rule: Rule,
-    /// For posterior moments.
+    /// For those that are less smooth.
     fine: Rule,
+    /// For noise beside a state that is not known either.
+    gusts: Rule,
+    /// For posterior moments in 1, 2, ... coordinates.
+    posterior: Vec<Rule>,
     /// The box in which a state can be, where walls without a map are known.
     bounds: Option<Vec<Interval>>,
 }
@@ -66,6 +78,9 @@ const COARSE: usize = 3;
 
 /// A standard deviation so many times smaller than the start's, or than a tenth of the bounds, counts as none.
 const CERTAIN: f64 = 1e-4;
+
+/// Variances that are none where numbers are whole.
+const NARROW: f64 = 1e-6;
 
 /// Most points that a start of whole numbers becomes.
 const MOST_POINTS: usize = 400;
@@ -96,9 +111,11 @@ impl SumKeeping {
                 false => COMPONENTS,
             }),
             splits: true,
-            floors: (0..n).map(floor).collect(),
+            likeness: Likeness::new((0..n).map(floor).collect(), dynamics.kinds()),
             rule: Rule::new(n, if n == 1 { 9 } else { 5 }),
             fine: Rule::new(n, if n == 1 { 15 } else { 7 }),
+            gusts: Rule::cubature(n),
+            posterior: (1..=n).map(posterior_rule).collect(),
             bounds: walled.map(|walls| walls.bounds.clone()),
             effects: EffectTable::new(model, |effects| effects),
             model: model.clone(),
@@ -151,6 +168,17 @@ impl SumKeeping {
 
     fn doing(&self, mode: ModeId, action: ActionId, step: usize) -> Doing {
         Doing { mode, action, step }
+    }
+}
+
+/// The rule that finds posterior moments in so many coordinates.
+fn posterior_rule(r: usize) -> Rule {
+    match r {
+        1 => Rule::product(1, 9),
+        2 => Rule::product(2, 6),
+        3 => Rule::product(3, 4),
+        4 => Rule::product(4, 3),
+        _ => Rule::new(r, 0),
     }
 }
 
@@ -235,8 +263,11 @@ impl Keeping for SumKeeping {
     }
 
     fn act(&self, full: &mut Sum, action: ActionId, step: usize) -> Acted {
+        let count = full.components.len();
         let acted = self.take(full, action, step);
-        reduce(&mut full.components, 2 * self.most, &self.floors);
+        if full.components.len() > count {
+            self.likeness.reduce(&mut full.components, 2 * self.most);
+        }
         acted
     }
 
@@ -252,7 +283,7 @@ impl Keeping for SumKeeping {
 
     fn sense(&self, full: &mut Sum, action: ActionId, step: usize, reading: Reading<'_>) {
         self.correct(full, action, step, reading);
-        reduce(&mut full.components, self.most, &self.floors);
+        self.likeness.reduce(&mut full.components, self.most);
     }
 
     fn moments(&self, full: &Sum, moments: &mut Moments) {
@@ -263,19 +294,28 @@ impl Keeping for SumKeeping {
         moments.covariance.resize(n * n, 0.0);
         moments.weights.clear();
         moments.weights.resize(self.dynamics.modes(), 0.0);
+        let apart = |component: &Component, from: &[f64], i: usize| {
+            self.likeness.apart(i, from[i], component.mean[i])
+        };
+        // Angles are averaged around one of them.
+        let around = full.components.first().map_or(&[][..], |first| &first.mean);
         for component in &full.components {
             moments.weights[component.mode] += component.weight;
-            for (mean, own) in moments.mean.iter_mut().zip(&component.mean) {
-                *mean += component.weight * own;
+            for (i, mean) in moments.mean.iter_mut().enumerate() {
+                *mean += component.weight * apart(component, around, i);
             }
         }
+        for (mean, around) in moments.mean.iter_mut().zip(around) {
+            *mean += around;
+        }
+        self.dynamics.wrap(&mut moments.mean);
         for component in &full.components {
             for i in 0..n {
-                let apart = component.mean[i] - moments.mean[i];
+                let along = apart(component, &moments.mean, i);
                 for j in 0..n {
                     let k = i * n + j;
                     let spread =
-                        component.covariance[k] + apart * (component.mean[j] - moments.mean[j]);
+                        component.covariance[k] + along * apart(component, &moments.mean, j);
                     moments.covariance[k] += component.weight * spread;
                 }
             }
@@ -294,7 +334,10 @@ impl Keeping for SumKeeping {
                 covariance: moments.covariance.clone(),
             })
             .collect();
-        for component in &mut components {
+        let n = self.dynamics.states();
+        // What is known exactly is known to be a whole number.
+        let narrow = (0..n).all(|i| moments.covariance[i * n + i] < NARROW);
+        for component in components.iter_mut().filter(|_| narrow) {
             self.dynamics.round_within(&mut component.mean);
         }
         normalise(&mut components);

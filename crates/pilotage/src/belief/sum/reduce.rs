@@ -1,6 +1,8 @@
 //! Fewer Gaussians: the hopeless are dropped, those most alike merged so that moments stay.
 
-use super::component::{Component, root};
+use super::component::Component;
+use super::frame::root;
+use crate::model::{VariableKind, wrapped};
 
 /// Components of less weight are dropped.
 const HOPELESS: f64 = 1e-6;
@@ -8,64 +10,211 @@ const HOPELESS: f64 = 1e-6;
 /// Components are merged where that costs less than this, in nats times weight.
 const ALIKE: f64 = 1e-5;
 
-/// Makes a sum of at most `most` components, its weights summing to 1. `floors` are standard deviations that count as none, length `n`.
-///
-/// What a merger costs is bounded by how much it raises the entropy (A. Runnalls, 2007).
-pub(super) fn reduce(components: &mut Vec<Component>, most: usize, floors: &[f64]) {
-    normalise(components);
-    let heaviest = components
-        .iter()
-        .fold(0.0, |most: f64, c| most.max(c.weight));
-    components.retain(|component| component.weight >= HOPELESS.min(heaviest));
-    let n = floors.len();
-    // Along a line, only neighbours can be most alike.
-    let line = n == 1;
-    components.sort_by(|a, b| a.mode.cmp(&b.mode).then(a.mean[0].total_cmp(&b.mean[0])));
-    let mut sizes: Vec<f64> = components.iter().map(|c| size(c, floors)).collect();
-    // Along a line only neighbours can be most alike; elsewhere each is compared with all after it.
-    let partners = |i: usize, count: usize| i + 1..if line { (i + 2).min(count) } else { count };
-    let nearest = |i: usize, components: &[Component], sizes: &[f64]| {
-        let own = |j: &usize| components[*j].mode == components[i].mode;
-        let partners = partners(i, components.len()).take_while(own);
-        let costs = partners.map(|j| {
-            let sizes = (sizes[i], sizes[j]);
-            (cost(&components[i], &components[j], sizes, floors), j)
-        });
-        costs.fold(
-            (f64::INFINITY, i),
-            |best, one| if one.0 < best.0 { one } else { best },
-        )
-    };
-    let mut best: Vec<(f64, usize)> = (0..components.len())
-        .map(|i| nearest(i, components, &sizes))
-        .collect();
-    while components.len() > 1 {
-        let least = (0..best.len()).fold(
-            0,
-            |least, i| if best[i].0 < best[least].0 { i } else { least },
-        );
-        let (cost, other) = best[least];
-        if !cost.is_finite() || (components.len() <= most && cost >= ALIKE) {
-            break;
+/// What tells components apart.
+#[derive(Debug, Clone)]
+pub(super) struct Likeness {
+    /// Standard deviations that count as none, length `n`.
+    floors: Vec<f64>,
+    /// Which variables are angles, length `n`.
+    angles: Vec<bool>,
+}
+
+impl Likeness {
+    pub(super) fn new(floors: Vec<f64>, kinds: &[VariableKind]) -> Self {
+        let angle = |kind: &VariableKind| *kind == VariableKind::Angle;
+        Self {
+            floors,
+            angles: kinds.iter().map(angle).collect(),
         }
-        let taken = components.remove(other);
-        sizes.remove(other);
-        best.remove(other);
-        merge(&mut components[least], &taken);
-        sizes[least] = size(&components[least], floors);
-        for (i, entry) in best.iter_mut().enumerate() {
-            let stale = i == least
-                || entry.1 == least
-                || entry.1 == other
-                || partners(i, components.len()).contains(&least);
-            if stale {
-                *entry = nearest(i, components, &sizes);
-            } else if entry.1 > other {
-                entry.1 -= 1;
+    }
+
+    /// How far a value of a variable is from another: for angles, the short way.
+    pub(super) fn apart(&self, variable: usize, from: f64, to: f64) -> f64 {
+        match self.angles[variable] {
+            true => wrapped(to - from),
+            false => to - from,
+        }
+    }
+
+    /// Makes a sum of at most `most` components, its weights summing to 1.
+    ///
+    /// What a merger costs is bounded by how much it raises the entropy (A. Runnalls, 2007).
+    pub(super) fn reduce(&self, components: &mut Vec<Component>, most: usize) {
+        normalise(components);
+        let heaviest = components
+            .iter()
+            .fold(0.0, |most: f64, c| most.max(c.weight));
+        components.retain(|component| component.weight >= HOPELESS.min(heaviest));
+        components.sort_by(|a, b| {
+            let place = a.mean[0].total_cmp(&b.mean[0]);
+            a.mode.cmp(&b.mode).then(place)
+        });
+        let sizes = components
+            .iter()
+            .map(|c| self.size(&c.covariance))
+            .collect();
+        let mut pairs = Pairs {
+            likeness: self,
+            sizes,
+            best: Vec::with_capacity(components.len()),
+        };
+        for i in 0..components.len() {
+            pairs.best.push(pairs.nearest(components, i));
+        }
+        while let Some((cost, one, other)) = pairs.cheapest() {
+            if components.len() <= most && cost >= ALIKE {
+                break;
+            }
+            pairs.merge(components, one, other);
+        }
+        normalise(components);
+    }
+
+    /// Takes another component in, so that weight, mean and covariance are those of both.
+    pub(super) fn merge(&self, one: &mut Component, other: &Component) {
+        let n = one.dim();
+        let total = one.weight + other.weight;
+        if total <= 0.0 {
+            return;
+        }
+        let (a, b) = (one.weight / total, other.weight / total);
+        let apart = |one: &Component, i| self.apart(i, one.mean[i], other.mean[i]);
+        for i in 0..n {
+            for j in 0..n {
+                let k = i * n + j;
+                let between = a * b * apart(one, i) * apart(one, j);
+                one.covariance[k] = a * one.covariance[k] + b * other.covariance[k] + between;
+            }
+        }
+        for i in 0..n {
+            one.mean[i] += b * apart(one, i);
+            if self.angles[i] {
+                one.mean[i] = wrapped(one.mean[i]);
+            }
+        }
+        one.weight = total;
+    }
+
+    /// How much merging raises the entropy at most; `sizes` are those of both.
+    fn cost(&self, one: &Component, other: &Component, sizes: (f64, f64)) -> f64 {
+        let total = one.weight + other.weight;
+        let (a, b) = (one.weight / total, other.weight / total);
+        let apart = |i: usize| self.apart(i, one.mean[i], other.mean[i]);
+        let entry = |k: usize, between: f64| {
+            a * one.covariance[k] + b * other.covariance[k] + a * b * between
+        };
+        let floor = |i: usize| self.floors[i] * self.floors[i];
+        let merged = match self.floors.len() {
+            1 => (entry(0, apart(0) * apart(0)) + floor(0)).ln(),
+            2 => {
+                let (x, y) = (apart(0), apart(1));
+                let (xx, yy) = (entry(0, x * x) + floor(0), entry(3, y * y) + floor(1));
+                let xy = entry(1, x * y);
+                (xx * yy - xy * xy).max(f64::MIN_POSITIVE).ln()
+            }
+            _ => {
+                let mut both = one.clone();
+                self.merge(&mut both, other);
+                self.size(&both.covariance)
+            }
+        };
+        0.5 * (total * merged - one.weight * sizes.0 - other.weight * sizes.1)
+    }
+
+    /// Logarithm of the determinant of a covariance, with the floors added.
+    fn size(&self, covariance: &[f64]) -> f64 {
+        let n = self.floors.len();
+        let floor = |i: usize| self.floors[i] * self.floors[i];
+        match n {
+            1 => (covariance[0] + floor(0)).ln(),
+            2 => {
+                let (x, y) = (covariance[0] + floor(0), covariance[3] + floor(1));
+                let determinant = x * y - covariance[1] * covariance[1];
+                determinant.max(f64::MIN_POSITIVE).ln()
+            }
+            _ => {
+                let mut lifted = covariance.to_vec();
+                for i in 0..n {
+                    lifted[i * n + i] += floor(i);
+                }
+                let root = root(&lifted, n);
+                let pivots = (0..n).map(|i| root[i * n + i].max(self.floors[i]));
+                2.0 * pivots.map(f64::ln).sum::<f64>()
             }
         }
     }
-    normalise(components);
+}
+
+/// Which component costs least to be merged with which later one, kept up to date from merger to merger.
+struct Pairs<'a> {
+    likeness: &'a Likeness,
+    sizes: Vec<f64>,
+    /// For every component, the least cost and with whom; infinite where there is nobody.
+    best: Vec<(f64, usize)>,
+}
+
+impl Pairs<'_> {
+    fn cheapest(&self) -> Option<(f64, usize, usize)> {
+        let all = self.best.iter().enumerate();
+        let all = all.map(|(i, (cost, other))| (*cost, i, *other));
+        all.min_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(cost, ..)| cost.is_finite())
+    }
+
+    /// The partner of a component among those after it. Along a line only the next can be most alike.
+    fn nearest(&self, components: &[Component], i: usize) -> (f64, usize) {
+        let after = match self.on_a_line() {
+            true => (i + 2).min(components.len()),
+            false => components.len(),
+        };
+        let mut best = (f64::INFINITY, i);
+        for j in i + 1..after {
+            if components[j].mode != components[i].mode {
+                break;
+            }
+            let cost = self.cost(components, i, j);
+            if cost < best.0 {
+                best = (cost, j);
+            }
+        }
+        best
+    }
+
+    fn cost(&self, components: &[Component], i: usize, j: usize) -> f64 {
+        let sizes = (self.sizes[i], self.sizes[j]);
+        self.likeness.cost(&components[i], &components[j], sizes)
+    }
+
+    fn on_a_line(&self) -> bool {
+        self.likeness.floors.len() == 1
+    }
+
+    /// Merges a component with a later one, which is gone afterwards.
+    fn merge(&mut self, components: &mut Vec<Component>, one: usize, other: usize) {
+        let taken = components.remove(other);
+        self.sizes.remove(other);
+        self.best.remove(other);
+        self.likeness.merge(&mut components[one], &taken);
+        self.sizes[one] = self.likeness.size(&components[one].covariance);
+        for i in 0..components.len() {
+            let (cost, with) = self.best[i];
+            let next = self.on_a_line() && i + 1 == other;
+            if i == one || next || cost.is_finite() && (with == one || with == other) {
+                self.best[i] = self.nearest(components, i);
+                continue;
+            }
+            if with > other {
+                self.best[i].1 -= 1;
+            }
+            // To those before it, what has grown may have come nearer.
+            if i < one && !self.on_a_line() && components[i].mode == components[one].mode {
+                let cost = self.cost(components, i, one);
+                if cost < self.best[i].0 {
+                    self.best[i] = (cost, one);
+                }
+            }
+        }
+    }
 }
 
 /// Makes weights sum to 1.
@@ -74,84 +223,6 @@ pub(super) fn normalise(components: &mut [Component]) {
     if total > 0.0 {
         for component in components {
             component.weight /= total;
-        }
-    }
-}
-
-/// Takes another component in, so that weight, mean and covariance are those of both.
-pub(super) fn merge(one: &mut Component, other: &Component) {
-    let n = one.mean.len();
-    let total = one.weight + other.weight;
-    if total <= 0.0 {
-        return;
-    }
-    let (a, b) = (one.weight / total, other.weight / total);
-    let apart: Vec<f64> = other
-        .mean
-        .iter()
-        .zip(&one.mean)
-        .map(|(x, y)| x - y)
-        .collect();
-    for i in 0..n {
-        for j in 0..n {
-            let k = i * n + j;
-            one.covariance[k] =
-                a * one.covariance[k] + b * other.covariance[k] + a * b * apart[i] * apart[j];
-        }
-    }
-    for (mean, apart) in one.mean.iter_mut().zip(&apart) {
-        *mean += b * apart;
-    }
-    one.weight = total;
-}
-
-/// How much merging raises the entropy at most.
-fn cost(one: &Component, other: &Component, sizes: (f64, f64), floors: &[f64]) -> f64 {
-    let total = one.weight + other.weight;
-    let merged = match floors.len() {
-        1 => {
-            let (a, b) = (one.weight / total, other.weight / total);
-            let apart = one.mean[0] - other.mean[0];
-            let within = a * one.covariance[0] + b * other.covariance[0];
-            (within + a * b * apart * apart + floors[0] * floors[0]).ln()
-        }
-        2 => {
-            let (a, b) = (one.weight / total, other.weight / total);
-            let apart = [0, 1].map(|i: usize| one.mean[i] - other.mean[i]);
-            let entry = |i: usize, j: usize| {
-                let k = 2 * i + j;
-                let own = a * one.covariance[k] + b * other.covariance[k];
-                let floor = if i == j { floors[i] * floors[i] } else { 0.0 };
-                own + a * b * apart[i] * apart[j] + floor
-            };
-            let size = entry(0, 0) * entry(1, 1) - entry(0, 1) * entry(1, 0);
-            size.max(f64::MIN_POSITIVE).ln()
-        }
-        _ => {
-            let mut both = one.clone();
-            merge(&mut both, other);
-            size(&both, floors)
-        }
-    };
-    0.5 * (total * merged - one.weight * sizes.0 - other.weight * sizes.1)
-}
-
-/// Logarithm of the determinant of the covariance, with the floors added.
-fn size(component: &Component, floors: &[f64]) -> f64 {
-    let n = floors.len();
-    let at = |i: usize, j: usize| {
-        component.covariance[i * n + j] + if i == j { floors[i] * floors[i] } else { 0.0 }
-    };
-    match n {
-        1 => at(0, 0).ln(),
-        2 => (at(0, 0) * at(1, 1) - at(0, 1) * at(1, 0))
-            .max(f64::MIN_POSITIVE)
-            .ln(),
-        _ => {
-            let lifted: Vec<f64> = (0..n * n).map(|k| at(k / n, k % n)).collect();
-            let root = root(&lifted, n);
-            let pivots = (0..n).map(|i| root[i * n + i].max(floors[i]));
-            2.0 * pivots.map(f64::ln).sum::<f64>()
         }
     }
 }

@@ -1,0 +1,145 @@
+//! A Gaussian seen from within: its own standard normal coordinates, of which a singular one has fewer than there are variables.
+
+use super::component::Component;
+
+/// `x = mean + root z` with `z` of length `r`, standard normal.
+pub(super) struct Frame {
+    mean: Vec<f64>,
+    /// `n x r`, row by row.
+    root: Vec<f64>,
+    /// Number of directions in which there is any variance, `r`.
+    pub(super) rank: usize,
+}
+
+/// A Gaussian in the coordinates of a frame.
+#[derive(Clone)]
+pub(super) struct Inner {
+    /// Length `r`.
+    pub(super) mean: Vec<f64>,
+    /// `r x r`, row by row.
+    pub(super) covariance: Vec<f64>,
+}
+
+impl Inner {
+    /// The standard normal of so many coordinates.
+    pub(super) fn standard(r: usize) -> Self {
+        let one = |k: usize| f64::from(k.is_multiple_of(r + 1));
+        Self {
+            mean: vec![0.0; r],
+            covariance: (0..r * r).map(one).collect(),
+        }
+    }
+}
+
+impl Frame {
+    pub(super) fn new(component: &Component) -> Self {
+        let n = component.dim();
+        let whole = root(&component.covariance, n);
+        let kept: Vec<usize> = (0..n).filter(|&j| whole[j * n + j] > 0.0).collect();
+        let rank = kept.len();
+        let root = match rank == n {
+            true => whole,
+            false => (0..n * rank)
+                .map(|k| whole[k / rank * n + kept[k % rank]])
+                .collect(),
+        };
+        Self {
+            mean: component.mean.clone(),
+            root,
+            rank,
+        }
+    }
+
+    /// Number of state variables, `n`.
+    pub(super) fn dim(&self) -> usize {
+        self.mean.len()
+    }
+
+    /// Writes the state at `z`.
+    pub(super) fn place(&self, z: &[f64], to: &mut [f64]) {
+        if self.rank == 0 {
+            return to.copy_from_slice(&self.mean);
+        }
+        let rows = self.root.chunks_exact(self.rank);
+        for ((value, mean), row) in to.iter_mut().zip(&self.mean).zip(rows) {
+            *value = mean + row.iter().zip(z).map(|(a, z)| a * z).sum::<f64>();
+        }
+    }
+
+    /// Gives a component the moments of a Gaussian in these coordinates.
+    pub(super) fn write(&self, inner: &Inner, component: &mut Component) {
+        let (n, r) = (self.mean.len(), self.rank);
+        self.place(&inner.mean, &mut component.mean);
+        for i in 0..n {
+            for j in 0..=i {
+                let mut sum = 0.0;
+                for k in 0..r {
+                    for l in 0..r {
+                        sum += self.root[i * r + k]
+                            * inner.covariance[k * r + l]
+                            * self.root[j * r + l];
+                    }
+                }
+                component.covariance[i * n + j] = sum;
+                component.covariance[j * n + i] = sum;
+            }
+            component.covariance[i * n + i] = component.covariance[i * n + i].max(0.0);
+        }
+    }
+}
+
+/// Lower triangular root of a covariance, row by row; 0 along directions without any variance.
+pub(super) fn root(covariance: &[f64], n: usize) -> Vec<f64> {
+    let mut root = vec![0.0; n * n];
+    root_into(covariance, n, &mut root);
+    root
+}
+
+/// The same, with room for it.
+pub(super) fn root_into(covariance: &[f64], n: usize, root: &mut [f64]) {
+    root.fill(0.0);
+    let scale = (0..n).fold(0.0, |most: f64, i| most.max(covariance[i * n + i]));
+    for j in 0..n {
+        let before: f64 = (0..j).map(|k| root[j * n + k] * root[j * n + k]).sum();
+        let pivot = covariance[j * n + j] - before;
+        // What is left of a variance in rounding is none.
+        if pivot <= 1e-14 * covariance[j * n + j] || pivot <= 1e-30 * scale || pivot <= 0.0 {
+            continue;
+        }
+        let pivot = pivot.sqrt();
+        root[j * n + j] = pivot;
+        for i in j + 1..n {
+            let shared: f64 = (0..j).map(|k| root[i * n + k] * root[j * n + k]).sum();
+            root[i * n + j] = (covariance[i * n + j] - shared) / pivot;
+        }
+    }
+}
+
+/// Writes `mean + root z`.
+pub(super) fn place(mean: &[f64], root: &[f64], z: &[f64], to: &mut [f64]) {
+    let n = mean.len();
+    for i in 0..n {
+        to[i] = mean[i] + (0..=i).map(|k| root[i * n + k] * z[k]).sum::<f64>();
+    }
+}
+
+/// Turns `x` into `L^-1 x` for the root `L` of a covariance; returns the logarithm of its density under N(0, L L'). Directions without
+/// variance are left out.
+pub(super) fn whiten(root: &[f64], x: &mut [f64]) -> f64 {
+    let n = x.len();
+    let mut log = 0.0;
+    for i in 0..n {
+        let before: f64 = (0..i).map(|k| root[i * n + k] * x[k]).sum();
+        let pivot = root[i * n + i];
+        if pivot > 0.0 {
+            x[i] = (x[i] - before) / pivot;
+            log -= pivot.ln() + 0.5 * (LOG_TAU + x[i] * x[i]);
+        } else {
+            x[i] = 0.0;
+        }
+    }
+    log
+}
+
+/// `ln 2 pi`.
+pub(super) const LOG_TAU: f64 = 1.837_877_066_409_345_3;

@@ -1,0 +1,126 @@
+//! What was sensed, and how likely it is in a state.
+
+use super::SumKeeping;
+use super::frame::{LOG_TAU, root_into, whiten};
+use crate::belief::gaussian::normal_cdf;
+use crate::belief::reading::Reading;
+use crate::model::{ActionId, Doing, Dynamics, ModeId};
+
+/// Noise of no variance is taken for one of this variance.
+const LEAST: f64 = 1e-24;
+
+/// A reading on its way into a sum, with room for what is asked at a state.
+pub(super) struct Sensor<'a> {
+    dynamics: &'a Dynamics,
+    pub(super) reading: Reading<'a>,
+    pub(super) doing: Doing,
+    /// Number of numbers that are read, `m`.
+    pub(super) m: usize,
+    /// What is read where it was last asked, length `m`, and the covariance of its noise, `m x m`.
+    pub(super) values: Vec<f64>,
+    pub(super) noise: Vec<f64>,
+    root: Vec<f64>,
+    likely: Vec<f64>,
+}
+
+impl<'a> Sensor<'a> {
+    pub(super) fn new(
+        keeping: &'a SumKeeping,
+        action: ActionId,
+        step: usize,
+        reading: Reading<'a>,
+    ) -> Self {
+        let dynamics = &keeping.dynamics;
+        let m = dynamics.readings();
+        Self {
+            dynamics,
+            reading,
+            doing: keeping.doing(0, action, step),
+            m,
+            values: vec![0.0; m],
+            noise: vec![0.0; m * m],
+            root: vec![0.0; m * m],
+            likely: vec![0.0; dynamics.symbols()],
+        }
+    }
+
+    /// Asked in this mode from now on.
+    pub(super) fn set_mode(&mut self, mode: ModeId) {
+        self.doing.mode = mode;
+    }
+
+    /// The numbers that were read, where they are not cut off at an end.
+    pub(super) fn numbers(&self) -> Option<&'a [f64]> {
+        match self.reading {
+            Reading::Values(values) if self.dynamics.saturates().is_empty() => Some(values),
+            _ => None,
+        }
+    }
+
+    /// Probability that there is a reading, where that is the same everywhere.
+    pub(super) fn present(&self) -> Option<f64> {
+        self.dynamics.constant_present(self.doing)
+    }
+
+    /// Asks what is read in a state, and with which noise.
+    pub(super) fn ask(&mut self, state: &[f64]) {
+        self.dynamics
+            .observation(self.doing, state, &mut self.values);
+        self.dynamics
+            .observation_noise(self.doing, state, &mut self.noise);
+    }
+
+    /// Logarithm of how likely what was sensed is in a state.
+    pub(super) fn log_likelihood(&mut self, state: &[f64]) -> f64 {
+        let present = self.dynamics.present(self.doing, state);
+        match self.reading {
+            Reading::Nothing => (1.0 - present).ln(),
+            Reading::Symbol(symbol) => {
+                self.dynamics
+                    .symbol_probabilities(self.doing, state, &mut self.likely);
+                let likely = self.likely.get(symbol as usize).copied();
+                (present * likely.unwrap_or(0.0)).ln()
+            }
+            Reading::Values(read) => {
+                self.ask(state);
+                let log = self.log_density(read);
+                if present < 1.0 {
+                    log + present.ln()
+                } else {
+                    log
+                }
+            }
+        }
+    }
+
+    fn log_density(&mut self, read: &[f64]) -> f64 {
+        let saturates = self.dynamics.saturates();
+        if !saturates.is_empty() {
+            let each = (0..self.m).map(|r| {
+                let (apart, variance) = (read[r] - self.values[r], self.noise[r * self.m + r]);
+                let sd = variance.max(LEAST).sqrt();
+                match read[r] {
+                    low if low <= saturates[r].low => normal_cdf(apart / sd).ln(),
+                    high if high >= saturates[r].high => normal_cdf(-apart / sd).ln(),
+                    _ => log_normal(apart, variance),
+                }
+            });
+            return each.sum();
+        }
+        if self.m == 1 {
+            return log_normal(read[0] - self.values[0], self.noise[0]);
+        }
+        for (r, (value, read)) in self.values.iter_mut().zip(read).enumerate() {
+            *value = read - *value;
+            let variance = &mut self.noise[r * self.m + r];
+            *variance = variance.max(LEAST);
+        }
+        root_into(&self.noise, self.m, &mut self.root);
+        whiten(&self.root, &mut self.values)
+    }
+}
+
+fn log_normal(apart: f64, variance: f64) -> f64 {
+    let variance = variance.max(LEAST);
+    -0.5 * (apart * apart / variance + variance.ln() + LOG_TAU)
+}
