@@ -3,7 +3,7 @@
 use super::grid::{Axis, Grid};
 use super::unsupported;
 use crate::error::Result;
-use crate::model::{Doing, Dynamics, Interval, Model, VariableKind};
+use crate::model::{Doing, Dynamics, Interval, Model, StartHypothesis, VariableKind};
 
 /// Cells along a variable where the model does not say, for one and for two variables.
 const CELLS: [usize; 2] = [200, 40];
@@ -14,12 +14,17 @@ const MOST: usize = 100_000;
 /// Where a variable has no bound, cells go so many standard deviations beyond every start.
 const SPREAD: f64 = 5.0;
 
+/// Where bounds are no walls, cells go on beyond them for at most this share of their width, for one and for two variables.
+const BEYOND: [f64; 2] = [0.5, 0.25];
+
 /// And as far as the strongest control leads in so many steps, with as much of its noise.
 const STEPS: f64 = 10.0;
 
-/// The cells of a model: between the bounds of each variable. Where there is no bound they reach from the starts (5 standard
-/// deviations) and the places of which rewards and events speak as far as the controls lead from the starts in ten steps, three
-/// standard deviations of that many steps' noise included. Whole numbers have a cell each, and the cells of a map's squares are whole.
+/// The cells of a model: between the bounds of each variable, and beyond them as far as the controls lead in ten steps if they are no
+/// walls to the belief, at most half of their width for one variable and a quarter for two. Where there is no bound they reach from the
+/// starts (5 standard deviations) and the places of which rewards and events speak as far as the controls lead from the starts in ten
+/// steps, three standard deviations of that many steps' noise included. Whole numbers have a cell each, squares of a map whole cells, and
+/// up to a quarter more cells are taken if controls then lead across whole ones.
 pub(super) fn grid(model: &Model, dynamics: &Dynamics) -> Result<Grid> {
     let n = model.state_dim();
     let Some(usual) = n.checked_sub(1).and_then(|i| CELLS.get(i)) else {
@@ -31,9 +36,7 @@ pub(super) fn grid(model: &Model, dynamics: &Dynamics) -> Result<Grid> {
         ));
     };
     let count = model.belief.cells.unwrap_or(*usual).max(2);
-    let axes: Vec<Axis> = (0..n)
-        .map(|i| axis(model, i, extent(model, dynamics, i), count))
-        .collect();
+    let axes: Vec<Axis> = (0..n).map(|i| axis(model, dynamics, i, count)).collect();
     let all = axes.iter().map(|axis| axis.count as f64).product::<f64>();
     if all > MOST as f64 || all.is_nan() {
         return Err(unsupported(
@@ -46,8 +49,9 @@ pub(super) fn grid(model: &Model, dynamics: &Dynamics) -> Result<Grid> {
     Ok(Grid { axes })
 }
 
-fn axis(model: &Model, variable: usize, extent: Interval, count: usize) -> Axis {
+fn axis(model: &Model, dynamics: &Dynamics, variable: usize, count: usize) -> Axis {
     let kind = model.state[variable].kind;
+    let extent = extent(model, dynamics, variable);
     let (low, high, count) = match kind {
         VariableKind::Integer => {
             let (low, high) = (
@@ -60,15 +64,35 @@ fn axis(model: &Model, variable: usize, extent: Interval, count: usize) -> Axis 
         VariableKind::Real => (
             extent.low,
             extent.high,
-            whole_squares(model, variable, count),
+            match model.map {
+                Some(_) => whole_squares(model, variable, count),
+                None => whole_steps(model, dynamics, variable, extent.width(), count),
+            },
         ),
     };
+    let width = (high - low) / count as f64;
+    let beyond = match kind {
+        VariableKind::Angle => [0, 0],
+        _ => beyond(model, dynamics, variable, high - low).map(|by| (by / width).ceil() as usize),
+    };
     Axis {
-        low,
-        width: (high - low) / count as f64,
-        count,
+        low: low - beyond[0] as f64 * width,
+        width,
+        count: count + beyond[0] + beyond[1],
         kind,
     }
+}
+
+/// How far cells go on beyond bounds that are no walls to the belief, on either side. Who goes there is as lost as before; were it the
+/// border, one would know where one is.
+fn beyond(model: &Model, dynamics: &Dynamics, variable: usize, width: f64) -> [f64; 2] {
+    let bounds = model.state[variable].bounds;
+    let most = width * BEYOND[model.state_dim() - 1];
+    let by = match dynamics.walls() {
+        Some(_) => 0.0,
+        None => reach(model, dynamics, variable).min(most),
+    };
+    [bounds.low, bounds.high].map(|end| if end.is_finite() { by } else { 0.0 })
 }
 
 /// The least number of cells, at least `count`, of which a square of the map has a whole number.
@@ -80,6 +104,27 @@ fn whole_squares(model: &Model, variable: usize, count: usize) -> usize {
     side.map_or(count, |squares| {
         count.next_multiple_of((squares.round() as usize).max(1))
     })
+}
+
+/// A number of cells, at least `count` and not many more, of which every control leads from the starts across a whole number; `count` if
+/// there is none. Without noise, mass would otherwise blur with every step.
+fn whole_steps(
+    model: &Model,
+    dynamics: &Dynamics,
+    variable: usize,
+    width: f64,
+    count: usize,
+) -> usize {
+    let steps: Vec<f64> = moves(model, dynamics)
+        .map(|(from, to, _)| to[variable] - from[variable])
+        .collect();
+    let whole = |cells: &usize| {
+        steps.iter().all(|step| {
+            let across = step / width * *cells as f64;
+            (across - across.round()).abs() < 1e-6
+        })
+    };
+    (count..=count + count / 4).find(whole).unwrap_or(count)
 }
 
 fn extent(model: &Model, dynamics: &Dynamics, variable: usize) -> Interval {
@@ -109,23 +154,32 @@ fn extent(model: &Model, dynamics: &Dynamics, variable: usize) -> Interval {
 
 /// How far the controls lead along a variable from the starts within reason.
 fn reach(model: &Model, dynamics: &Dynamics, variable: usize) -> f64 {
+    let reach = |(from, to, noise): (Vec<f64>, Vec<f64>, Vec<f64>)| {
+        let variance = noise[variable * (from.len() + 1)].max(0.0);
+        STEPS * (to[variable] - from[variable]).abs() + 3.0 * (STEPS * variance).sqrt()
+    };
+    moves(model, dynamics).map(reach).fold(0.0, f64::max)
+}
+
+/// Where every action leads from the mean of every start, and with which noise.
+fn moves<'a>(
+    model: &'a Model,
+    dynamics: &'a Dynamics,
+) -> impl Iterator<Item = (Vec<f64>, Vec<f64>, Vec<f64>)> + 'a {
     let n = model.state_dim();
-    let (mut to, mut noise) = (vec![0.0; n], vec![0.0; n * n]);
-    let mut farthest = 0.0f64;
-    for start in &model.start {
-        for action in 0..model.actions.len() {
+    let of = move |start: &'a StartHypothesis| {
+        (0..model.actions.len()).map(move |action| {
             let doing = Doing {
                 mode: start.mode,
                 action,
                 step: 0,
             };
             let from = start.mean.as_slice();
+            let (mut to, mut noise) = (vec![0.0; n], vec![0.0; n * n]);
             dynamics.transition(doing, from, &mut to);
             dynamics.transition_noise(doing, from, &mut noise);
-            let variance = noise[variable * (n + 1)].max(0.0);
-            let step = (to[variable] - from[variable]).abs();
-            farthest = farthest.max(STEPS * step + 3.0 * (STEPS * variance).sqrt());
-        }
-    }
-    farthest
+            (from.to_vec(), to, noise)
+        })
+    };
+    model.start.iter().flat_map(of)
 }

@@ -92,44 +92,21 @@ impl Backup {
         }
     }
 
-    /// Going on with a vector for ever, whatever is sensed (a discrete sensor's signal, that is).
-    pub(super) fn repeat(&self, vector: usize, set: &VectorSet) -> Choice {
-        let action = set.vectors[vector].action;
-        let ahead = self
-            .keeping
-            .backward(action, &vec![1.0; self.keeping.states()]);
-        let goes_on = ahead.iter().any(|share| *share > 0.0);
-        let signals = self.keeping.sensor().table(action, 0).signals.len() + 1;
-        Choice {
-            action,
-            value: f64::NAN,
-            picks: if goes_on {
-                vec![vector; signals]
-            } else {
-                Vec::new()
-            },
-            partition: Partition::Signals,
-        }
-    }
-
     /// What a choice is worth in every mode and cell.
-    pub(super) fn vector(&self, choice: &Choice, point: Point, set: &VectorSet) -> ValueVector {
-        let vector = |pick: usize| &set.vectors[pick].values[..];
-        let values = self.values(choice, &vector, set.start);
+    pub(super) fn vector(&self, choice: &Choice, set: &VectorSet) -> ValueVector {
+        let next = choice.picks.iter().map(|pick| set.vectors[*pick].clone());
         ValueVector {
             action: choice.action,
-            values,
-            witness: Some(Arc::new(point)),
+            values: self.values(choice, set),
+            next: Some(match self.keeping.is_discrete() {
+                true => next.collect(),
+                // Bins are the belief's own, and nobody follows them.
+                false => Vec::new(),
+            }),
         }
     }
 
-    /// The same where `vector` says what it is worth to go on, and `start` what a restart is.
-    pub(super) fn values<'a>(
-        &self,
-        choice: &Choice,
-        vector: &dyn Fn(usize) -> &'a [f64],
-        start: f64,
-    ) -> Vec<f64> {
+    fn values(&self, choice: &Choice, set: &VectorSet) -> Vec<f64> {
         let states: Vec<usize> = (0..self.keeping.states()).collect();
         let mut later = vec![0.0; states.len()];
         if !choice.picks.is_empty() {
@@ -139,15 +116,15 @@ impl Backup {
                 let signals = choice.picks.iter().zip(likely.column(state));
                 *later = signals
                     .filter(|(_, likely)| **likely > 0.0)
-                    .map(|(pick, likely)| likely * vector(*pick)[state])
+                    .map(|(pick, likely)| likely * set.vectors[*pick].values[state])
                     .sum();
             }
         }
-        self.before(choice.action, &later, start)
+        self.before(choice.action, &later, set.start)
     }
 
     /// What an action is worth where `later` is had after it.
-    fn before(&self, action: ActionId, later: &[f64], start: f64) -> Vec<f64> {
+    pub(super) fn before(&self, action: ActionId, later: &[f64], start: f64) -> Vec<f64> {
         let mut values = self.keeping.backward(action, later);
         let rewards = self.keeping.rewards(action).iter();
         let restarts = self.keeping.restarts(action).iter();
@@ -175,7 +152,7 @@ impl Backup {
         ValueVector {
             action,
             values,
-            witness: None,
+            next: None,
         }
     }
 }
@@ -191,12 +168,8 @@ fn best_after(likely: &DMatrix<f64>, ahead: &Point, set: &VectorSet) -> (Vec<usi
     });
     // Columns side by side: what each vector is worth together with each signal.
     let worth = vectors.tr_mul(&joint);
-    let (on_average, _) = set.best(ahead);
     let best = |signal: usize| {
         let column = worth.column(signal);
-        if joint.column(signal).sum() <= NEVER {
-            return (on_average, column[on_average]);
-        }
         let first = (0, f64::NEG_INFINITY);
         let pairs = column.iter().copied().enumerate();
         pairs.fold(first, |best, next| match next.1 > best.1 {
@@ -204,7 +177,14 @@ fn best_after(likely: &DMatrix<f64>, ahead: &Point, set: &VectorSet) -> (Vec<usi
             false => best,
         })
     };
-    let chosen: Vec<(usize, f64)> = (0..signals).map(best).collect();
+    let mut chosen: Vec<(usize, f64)> = (0..signals).map(best).collect();
+    // What cannot be sensed here goes where the likeliest signal goes, so that nothing is kept for it.
+    let likely = |signal: &usize| joint.column(*signal).sum();
+    let likeliest = (0..signals).max_by(|a, b| likely(a).total_cmp(&likely(b)));
+    let usual = likeliest.map_or(0, |signal| chosen[signal].0);
+    for signal in (0..signals).filter(|signal| likely(signal) <= NEVER) {
+        chosen[signal] = (usual, worth[(usual, signal)]);
+    }
     let value = chosen.iter().map(|(_, value)| value).sum();
     (chosen.into_iter().map(|(pick, _)| pick).collect(), value)
 }

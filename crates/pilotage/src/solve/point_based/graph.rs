@@ -1,20 +1,27 @@
 //! Policies of discrete sensors as graphs: an action a node, and where to go after each signal.
 //!
+//! Every vector is the value of a graph that exists: its action, and the vectors it was backed up from. That of the start is exact, but
+//! holds every round there was. It is made smaller, and better, by what is believed where: each way goes on with the node that is best
+//! for the beliefs that come along it, and nodes are taken for others where that costs little. Each change is kept only if the exact
+//! value of the whole graph stays.
+//!
 //! # References
 //! - E. A. Hansen, "Solving POMDPs by searching in policy space", 1998: graphs, and their values by linear equations.
-//! - S. Ji, R. Parr, H. Li, X. Liao and L. Carin, "Point-based policy iteration", 2007: graphs by backups at beliefs.
+//! - P. Poupart and C. Boutilier, "Bounded finite state controllers", 2003: improving nodes for the beliefs in which they are met.
 
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use super::backup::{Backup, Choice};
+use nalgebra::DMatrix;
+
+use super::backup::Backup;
 use super::point::{Point, ValueVector, VectorSet};
+use crate::belief::Keeping;
 use crate::model::ActionId;
 use crate::parallel;
 
 /// Values of nodes are iterated until they change by less than this share of the largest, or so often.
-const CLOSE: f64 = 1e-9;
+const CLOSE: f64 = 1e-8;
 const SWEEPS: usize = 20_000;
 
 /// A node of a policy.
@@ -35,124 +42,100 @@ pub struct PolicyGraph {
     pub values: Vec<Vec<f64>>,
     /// What it earns from the start.
     pub value: f64,
-    /// For each node the belief for which it was made.
-    witnesses: Vec<Option<Arc<Point>>>,
 }
 
-impl PolicyGraph {
-    /// The graph of acting by one look ahead at the witness of every vector.
-    pub(super) fn new(backup: &Backup, set: &VectorSet) -> Self {
-        let made = merged(reached(backup, set));
-        let values = values(backup, &made);
+/// What it takes to value graphs.
+pub(super) struct Grapher<'a> {
+    pub(super) backup: &'a Backup,
+    /// By action: how likely each signal is, by mode and cell; the last row is that of none.
+    pub(super) likely: Vec<DMatrix<f64>>,
+    /// By action, whether the episode may go on.
+    goes_on: Vec<bool>,
+}
+
+impl<'a> Grapher<'a> {
+    pub(super) fn new(backup: &'a Backup) -> Self {
+        use super::signals::Partition;
+        let keeping = &*backup.keeping;
+        let states: Vec<usize> = (0..keeping.states()).collect();
+        let ones = vec![1.0; states.len()];
+        let likely = |action| Partition::Signals.likelihoods(keeping, action, &states);
+        let goes_on = |action| keeping.backward(action, &ones).iter().any(|x| *x > 0.0);
         Self {
-            value: backup.start.expected(&values[0]),
-            nodes: made.iter().map(|made| made.node.clone()).collect(),
-            witnesses: made.into_iter().map(|made| made.witness).collect(),
+            backup,
+            likely: (0..keeping.actions()).map(likely).collect(),
+            goes_on: (0..keeping.actions()).map(goes_on).collect(),
+        }
+    }
+
+    /// The graph that the best vector of the start stands for.
+    pub(super) fn of(&self, set: &VectorSet) -> PolicyGraph {
+        let best = set.best(&self.backup.start).0;
+        let root = set.vectors[best].clone();
+        let mut numbers: HashMap<*const ValueVector, usize> = HashMap::new();
+        numbers.insert(Arc::as_ptr(&root), 0);
+        let mut found = vec![root];
+        let mut asked = 0;
+        while asked < found.len() {
+            for next in found[asked].next.clone().into_iter().flatten() {
+                let number = found.len();
+                if *numbers.entry(Arc::as_ptr(&next)).or_insert(number) == number {
+                    found.push(next);
+                }
+            }
+            asked += 1;
+        }
+        let node = |(index, vector): (usize, &Arc<ValueVector>)| {
+            let action = vector.action;
+            let signals = self.likely[action].nrows();
+            let next = match &vector.next {
+                Some(next) => next
+                    .iter()
+                    .map(|next| numbers[&Arc::as_ptr(next)])
+                    .collect(),
+                None if self.goes_on[action] => vec![index; signals],
+                None => Vec::new(),
+            };
+            PolicyNode { action, next }
+        };
+        let nodes = found.iter().enumerate().map(node).collect();
+        let values = found.iter().map(|vector| vector.values.clone()).collect();
+        self.valued(nodes, values)
+    }
+
+    /// A graph with its values, iterated from others.
+    pub(super) fn valued(&self, nodes: Vec<PolicyNode>, mut values: Vec<Vec<f64>>) -> PolicyGraph {
+        let discount = self.backup.discount;
+        for _ in 0..SWEEPS {
+            let start = self.backup.start.expected(&values[0]);
+            let next = parallel::map(nodes.len(), |node| {
+                self.values(&nodes[node], &values, start)
+            });
+            let (change, largest) = change(&values, &next);
+            values = next;
+            if change <= CLOSE * (1.0 - discount) * largest {
+                break;
+            }
+        }
+        PolicyGraph {
+            value: self.backup.start.expected(&values[0]),
+            nodes,
             values,
         }
     }
 
-    /// Its nodes as vectors: what is earned by a policy that exists.
-    pub(super) fn vectors(&self) -> Vec<Arc<ValueVector>> {
-        let vector = |node: usize| {
-            Arc::new(ValueVector {
-                action: self.nodes[node].action,
-                values: self.values[node].clone(),
-                witness: self.witnesses[node].clone(),
-            })
-        };
-        (0..self.nodes.len()).map(vector).collect()
-    }
-}
-
-/// A node, and what it was made of.
-#[derive(Debug, Clone)]
-struct Made {
-    node: PolicyNode,
-    choice: Choice,
-    witness: Option<Arc<Point>>,
-}
-
-/// Nodes reached from the start: first its own, then those of vectors, each backed up at its witness.
-fn reached(backup: &Backup, set: &VectorSet) -> Vec<Made> {
-    let mut numbers = BTreeMap::new();
-    let start = Arc::new(backup.start.clone());
-    let mut found = vec![(backup.choose(&start, set), Some(start))];
-    let mut asked = 0;
-    while asked < found.len() {
-        for pick in found[asked].0.picks.clone() {
-            if let Entry::Vacant(entry) = numbers.entry(pick) {
-                entry.insert(found.len());
-                found.push(at_witness(backup, set, pick));
+    /// What a node is worth where others are worth `values`.
+    fn values(&self, node: &PolicyNode, values: &[Vec<f64>], start: f64) -> Vec<f64> {
+        let likely = &self.likely[node.action];
+        let mut later = vec![0.0; likely.ncols()];
+        for (signal, next) in node.next.iter().enumerate() {
+            let next = &values[*next];
+            for (state, later) in later.iter_mut().enumerate() {
+                *later += likely[(signal, state)] * next[state];
             }
         }
-        asked += 1;
+        self.backup.before(node.action, &later, start)
     }
-    let made = |(choice, witness): (Choice, Option<Arc<Point>>)| Made {
-        node: PolicyNode {
-            action: choice.action,
-            next: choice.picks.iter().map(|pick| numbers[pick]).collect(),
-        },
-        choice,
-        witness,
-    };
-    found.into_iter().map(made).collect()
-}
-
-/// What to do where a vector is best. One without a witness repeats its action for ever.
-fn at_witness(backup: &Backup, set: &VectorSet, vector: usize) -> (Choice, Option<Arc<Point>>) {
-    match &set.vectors[vector].witness {
-        Some(point) => (backup.choose(point, set), Some(point.clone())),
-        None => (backup.repeat(vector, set), None),
-    }
-}
-
-/// Takes nodes that do the same for one, again and again.
-fn merged(mut made: Vec<Made>) -> Vec<Made> {
-    loop {
-        let mut known: BTreeMap<(ActionId, Vec<usize>), usize> = BTreeMap::new();
-        let mut becomes = Vec::with_capacity(made.len());
-        let mut kept: Vec<Made> = Vec::new();
-        for one in &made {
-            let next = kept.len();
-            let key = (one.node.action, one.node.next.clone());
-            let number = *known.entry(key).or_insert(next);
-            if number == next {
-                kept.push(one.clone());
-            }
-            becomes.push(number);
-        }
-        if kept.len() == made.len() {
-            return made;
-        }
-        for next in kept.iter_mut().flat_map(|one| &mut one.node.next) {
-            *next = becomes[*next];
-        }
-        made = kept;
-    }
-}
-
-/// What each node earns from every mode and cell.
-fn values(backup: &Backup, made: &[Made]) -> Vec<Vec<f64>> {
-    let choice = |one: &Made| Choice {
-        picks: one.node.next.clone(),
-        ..one.choice.clone()
-    };
-    let choices: Vec<Choice> = made.iter().map(choice).collect();
-    let mut values = vec![vec![0.0; backup.keeping.states()]; made.len()];
-    for _ in 0..SWEEPS {
-        let start = backup.start.expected(&values[0]);
-        let vector = |node: usize| &values[node][..];
-        let next = parallel::map(made.len(), |node| {
-            backup.values(&choices[node], &vector, start)
-        });
-        let (change, largest) = change(&values, &next);
-        values = next;
-        if change <= CLOSE * (1.0 - backup.discount) * largest {
-            break;
-        }
-    }
-    values
 }
 
 /// Largest change, and largest value.
@@ -161,4 +144,69 @@ fn change(old: &[Vec<f64>], new: &[Vec<f64>]) -> (f64, f64) {
     pairs.fold((0.0, 0.0), |(change, largest): (f64, f64), (a, b)| {
         (change.max((a - b).abs()), largest.max(b.abs()))
     })
+}
+
+/// Takes nodes that do the same for one, again and again.
+pub(super) fn merged(mut graph: PolicyGraph) -> PolicyGraph {
+    loop {
+        let mut known: BTreeMap<(ActionId, Vec<usize>), usize> = BTreeMap::new();
+        let becomes: Vec<usize> = graph
+            .nodes
+            .iter()
+            .enumerate()
+            .map(|(index, node)| {
+                *known
+                    .entry((node.action, node.next.clone()))
+                    .or_insert(index)
+            })
+            .collect();
+        if becomes.iter().enumerate().all(|(node, one)| node == *one) {
+            return graph;
+        }
+        graph = redirected(graph, &becomes);
+    }
+}
+
+/// The graph whose ways lead to other nodes, without those that are no longer reached.
+fn redirected(graph: PolicyGraph, becomes: &[usize]) -> PolicyGraph {
+    let mut nodes = graph.nodes;
+    for next in nodes.iter_mut().flat_map(|node| &mut node.next) {
+        *next = becomes[*next];
+    }
+    let (nodes, values) = reached(&nodes, &graph.values, becomes[0]);
+    PolicyGraph {
+        nodes,
+        values,
+        value: graph.value,
+    }
+}
+
+/// The nodes that are reached from one of them, which comes first, with their values.
+pub(super) fn reached(
+    nodes: &[PolicyNode],
+    values: &[Vec<f64>],
+    first: usize,
+) -> (Vec<PolicyNode>, Vec<Vec<f64>>) {
+    let mut order = vec![first];
+    let mut numbers = BTreeMap::from([(first, 0)]);
+    let mut asked = 0;
+    while asked < order.len() {
+        for next in &nodes[order[asked]].next {
+            let number = order.len();
+            if *numbers.entry(*next).or_insert(number) == number {
+                order.push(*next);
+            }
+        }
+        asked += 1;
+    }
+    let node = |index: &usize| PolicyNode {
+        action: nodes[*index].action,
+        next: nodes[*index]
+            .next
+            .iter()
+            .map(|next| numbers[next])
+            .collect(),
+    };
+    let values = order.iter().map(|index| values[*index].clone());
+    (order.iter().map(node).collect(), values.collect())
 }

@@ -37,7 +37,7 @@ pub(super) fn improve(
         let made = parallel::map(chosen.len(), |i| {
             let point = &points[chosen[i]];
             let choice = backup.choose(point, set);
-            backup.vector(&choice, point.clone(), set)
+            backup.vector(&choice, set)
         });
         for (point, vector) in chosen.into_iter().zip(made) {
             let gains = round.take(point, vector);

@@ -16,6 +16,7 @@ mod graph;
 mod improve;
 mod point;
 mod policy;
+mod shrink;
 mod signals;
 #[cfg(test)]
 mod tests;
@@ -39,6 +40,7 @@ use crate::model::Model;
 use crate::progress::Progress;
 use crate::random::{Rng, Role, stream};
 use backup::Backup;
+use graph::Grapher;
 use improve::improve;
 use point::{Point, VectorSet};
 use walk::{Met, Walker};
@@ -58,9 +60,6 @@ const SWEEPS: usize = 12;
 /// Share of what a round has to gain that counts as a gain at a belief.
 const HARDLY: f64 = 0.01;
 
-/// A graph is improved by backups at most so often.
-const GRAPHS: usize = 8;
-
 /// What point-based value iteration can be told.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PointBased {
@@ -76,6 +75,8 @@ pub struct PointBased {
     pub exploration: f64,
     /// Most bins along a reading, at least 2, at most 10000; `auto` for 40 of one reading and 12 of two.
     pub bins: Option<usize>,
+    /// Share of the value of a graph that one with fewer nodes may cost; 0 to 1.
+    pub spare: f64,
     /// Seed of the random numbers.
     pub seed: u64,
 }
@@ -89,6 +90,7 @@ impl Default for PointBased {
             epsilon: 1e-3,
             exploration: 0.15,
             bins: None,
+            spare: 2e-3,
             seed: 1,
         }
     }
@@ -105,6 +107,8 @@ impl Settings for PointBased {
         ensure("apart", self.apart, fits, "from 0 to 2")?;
         let fits = (0.0..=1.0).contains(&self.exploration);
         ensure("exploration", self.exploration, fits, "from 0 to 1")?;
+        let fits = (0.0..=1.0).contains(&self.spare);
+        ensure("spare", self.spare, fits, "from 0 to 1")?;
         let fits = self.epsilon > 0.0 && self.epsilon.is_finite();
         ensure("epsilon", self.epsilon, fits, "above 0")
     }
@@ -181,7 +185,7 @@ pub fn solve(
         observer,
     };
     let (met, set, converged) = search.run();
-    let (set, graph) = search.graph(&met, set);
+    let graph = search.graph(&set);
     Ok(PointBasedPlan {
         value: set.start,
         policy: PointBasedPolicy::new(backup, set),
@@ -273,30 +277,22 @@ impl Search<'_> {
         set
     }
 
-    /// The best graph of some, each made of vectors that the values of the one before have joined.
-    fn graph(&self, met: &Met, mut set: VectorSet) -> (VectorSet, Option<PolicyGraph>) {
+    /// The policy as a graph.
+    fn graph(&self, set: &VectorSet) -> Option<PolicyGraph> {
         if !self.backup.keeping.is_discrete() {
-            return (set, None);
+            return None;
         }
-        let mut rng = self.rng();
-        let mut best: Option<PolicyGraph> = None;
-        for _ in 0..GRAPHS {
-            let graph = PolicyGraph::new(self.backup, &set);
-            let known = best.as_ref().map_or(f64::NEG_INFINITY, |best| best.value);
-            let gain = graph.value - known;
-            let vectors = graph
-                .vectors()
-                .into_iter()
-                .chain(set.vectors.iter().cloned());
-            set = VectorSet::new(vectors.collect(), &self.backup.start);
-            if gain > 0.0 {
-                best = Some(graph);
-            }
-            if gain <= 0.1 * self.settings.epsilon * set.start.abs() {
-                break;
-            }
-            set = self.sweep(&met.points, set, &mut rng);
-        }
-        (set, best)
+        let grapher = Grapher::new(self.backup);
+        let graph = graph::merged(grapher.of(set));
+        let told = |graph: &PolicyGraph| {
+            let nodes = graph.nodes.len();
+            let status = format!("{nodes} nodes, value {:.4}", graph.value);
+            self.observer.status(&status);
+        };
+        told(&graph);
+        let floor = graph.value - self.settings.spare * graph.value.abs();
+        let graph = shrink::shrunk(&grapher, graph, floor);
+        told(&graph);
+        Some(graph)
     }
 }

@@ -47,8 +47,9 @@ pub struct ValueVector {
     pub action: ActionId,
     /// Expected discounted return, by mode and cell.
     pub values: Vec<f64>,
-    /// The belief for which it was made.
-    pub(super) witness: Option<Arc<Point>>,
+    /// What to go on with after each signal of a discrete sensor, and last, after none; empty where the episode never goes on. A vector
+    /// that repeats its action has `None`.
+    pub(super) next: Option<Vec<Arc<ValueVector>>>,
 }
 
 /// Vectors, of which the best one at a belief is its value.
