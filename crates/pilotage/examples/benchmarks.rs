@@ -106,9 +106,13 @@ fn section(problem: &Problem) -> Result<String, Box<dyn Error>> {
         eprintln!("{}, at most {most} nodes", problem.name);
         let program = std::env::current_exe()?;
         let most = most.to_string();
-        let run = Command::new(program).args(["--one", &problem.name, &most]).output()?;
+        let run = Command::new(program)
+            .args(["--one", &problem.name, &most])
+            .output()?;
         if !run.status.success() {
-            return Err(format!("{}: {}", problem.name, String::from_utf8_lossy(&run.stderr)).into());
+            return Err(
+                format!("{}: {}", problem.name, String::from_utf8_lossy(&run.stderr)).into(),
+            );
         }
         let row: Row = serde_json::from_slice(&run.stdout)?;
         let estimate = |(mean, stderr): (f64, f64)| format!("{mean:.3} ± {stderr:.3}");
@@ -120,7 +124,8 @@ fn section(problem: &Problem) -> Result<String, Box<dyn Error>> {
             estimate(row.earned),
             row.rule.map_or_else(|| "-".to_owned(), estimate),
             row.seconds,
-            row.mebibytes.map_or_else(|| "-".to_owned(), |size| format!("{size:.0}")),
+            row.mebibytes
+                .map_or_else(|| "-".to_owned(), |size| format!("{size:.0}")),
         );
     }
     if !problem.published.is_empty() {
@@ -152,7 +157,9 @@ fn measure(name: &str, most: usize) -> Result<Row, Box<dyn Error>> {
     let pair = |estimate: pilotage::simulate::Estimate| (estimate.mean, estimate.stderr);
     Ok(Row {
         most,
-        nodes: solution.automaton().map_or(0, |automaton| automaton.nodes.len()),
+        nodes: solution
+            .automaton()
+            .map_or(0, |automaton| automaton.nodes.len()),
         planned: solution.planned_value.unwrap_or(f64::NAN),
         earned: pair(earned.assumed.discounted),
         rule: earned.rule.map(|rule| pair(rule.discounted)),
