@@ -340,7 +340,7 @@ fn solvers_that_know_one_sensor_refuse_others() {
         (
             &missing,
             "missing",
-            &["value-iteration", "qmdp", "mls", "arkaq"][..],
+            &["value-iteration", "qmdp", "mls", "point-based", "arkaq"][..],
         ),
         (&later, "step", &["value-iteration", "arkaq"][..]),
     ] {

@@ -5,6 +5,7 @@
 
 use super::filter::{Belief, Filter};
 use super::reading::Reading;
+use super::updater::Held;
 use crate::model::ActionId;
 
 /// Keeps a belief from step to step.
@@ -17,6 +18,11 @@ pub trait Tracker: Send {
 
     /// What is believed now, as a policy reads it.
     fn belief(&self) -> &Belief;
+
+    /// What is believed now, as it is held, where more is known of it than what a policy reads.
+    fn held(&self) -> Option<&Held> {
+        None
+    }
 }
 
 /// Makes trackers, each at the start: one for every agent.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::codebook::Codebook;
 use super::full::{Keeping, Moments};
 use super::{
-    Belief, BeliefMdp, BeliefSpace, CellsKeeping, CodedSpace, Filter, Reading, SumKeeping, Tracker,
-    Tracking,
+    Belief, BeliefMdp, BeliefSpace, Cells, CellsKeeping, CodedSpace, Filter, Reading, SumKeeping,
+    Tracker, Tracking,
 };
 use crate::error::Result;
 use crate::model::{ActionId, Model, ModelText, TrackerKind};
@@ -258,6 +258,14 @@ impl Held {
     pub fn belief(&self) -> &Belief {
         &self.read
     }
+
+    /// Probabilities of cells, where these are what is kept.
+    pub fn cells(&self) -> Option<&Cells> {
+        match &self.kept {
+            Kept::Cells(running) => Some(&running.full),
+            Kept::Linear { .. } | Kept::Sum(_) => None,
+        }
+    }
 }
 
 /// The belief that an [`Updater`] keeps.
@@ -277,6 +285,10 @@ impl Tracker for Tracked<'_> {
 
     fn belief(&self) -> &Belief {
         self.held.belief()
+    }
+
+    fn held(&self) -> Option<&Held> {
+        Some(&self.held)
     }
 }
 

@@ -360,7 +360,7 @@ impl Default for BeliefSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum TrackerKind {
-    /// What the model asks for: `linear` for a linear model, `cells` for a discrete sensor, `sum` elsewhere.
+    /// What the model asks for: `linear` for a linear model, `cells` for a discrete sensor and for one or two whole numbers, `sum` elsewhere.
     #[default]
     Auto,
     /// The Kalman filter on uncertainty levels, at one believed mode.
@@ -453,6 +453,13 @@ impl Model {
         &motion.b * &self.actions[action].control + &motion.drift
     }
 
+    /// Whether its states are so few whole numbers that each can have a cell.
+    fn counts_only(&self) -> bool {
+        let mut state = self.state.iter();
+        let counts = state.all(|variable| variable.kind == VariableKind::Integer);
+        counts && self.clock() == 0 && self.state_dim() <= 2
+    }
+
     /// Whether motion and sensing are linear, with Gaussian noise that no place and no mode changes, events are certain where they
     /// happen, and rewards are numbers: whether uncertainty levels follow it.
     pub fn is_linear(&self) -> bool {
@@ -516,6 +523,7 @@ impl Model {
         match self.belief.tracker {
             TrackerKind::Auto if self.is_linear() => TrackerKind::Linear,
             TrackerKind::Auto if !self.laws.symbols.is_empty() => TrackerKind::Cells,
+            TrackerKind::Auto if self.counts_only() => TrackerKind::Cells,
             TrackerKind::Auto => TrackerKind::Sum,
             chosen => chosen,
         }

@@ -24,7 +24,7 @@ pub use runner::AutomatonRunner;
 pub(crate) use tree::StratumFeatures;
 pub use tree::{Branch, Feature, Test, Tree};
 
-use crate::belief::Belief;
+use crate::belief::{Belief, Held};
 use crate::model::ActionId;
 
 /// A rule that says what to do at every belief.
@@ -35,6 +35,17 @@ pub trait Policy: Send + Sync {
     /// The return expected from taking an action at a belief and following the policy from then on, where it knows.
     fn action_value(&self, belief: &Belief, action: ActionId) -> Option<f64> {
         let _ = (belief, action);
+        None
+    }
+
+    /// The action at a belief in full: that at what it is read as, unless the policy sees more of it.
+    fn action_in_full(&self, held: &Held) -> ActionId {
+        self.action(held.belief())
+    }
+
+    /// The return expected from each action at a belief in full, where the policy sees more of it than what it is read as.
+    fn values_in_full(&self, held: &Held) -> Option<Vec<f64>> {
+        let _ = held;
         None
     }
 

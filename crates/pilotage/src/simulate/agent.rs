@@ -46,7 +46,10 @@ impl Agent for TrackingAgent<'_> {
     }
 
     fn act(&mut self) -> ActionId {
-        self.policy.action(self.tracker.belief())
+        match self.tracker.held() {
+            Some(held) => self.policy.action_in_full(held),
+            None => self.policy.action(self.tracker.belief()),
+        }
     }
 
     fn observe(&mut self, action: ActionId, reading: Reading<'_>) {

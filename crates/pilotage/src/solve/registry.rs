@@ -2,12 +2,14 @@
 
 use super::settings::{SettingInfo, Settings};
 use super::solver::{Learner, Planner, Solver};
-use super::{Arkaq, CodebookPlanner, Kafaq, Kbvi, Lqg, Mls, PolicySearch, Qmdp, ValueIteration};
+use super::{
+    Arkaq, CodebookPlanner, Kafaq, Kbvi, Lqg, Mls, PointBased, PolicySearch, Qmdp, ValueIteration,
+};
 use crate::error::{Error, Result};
 use crate::model::{Model, suggest};
 
 /// Every solver of the library, the first that accepts a model being the one to try first.
-const BUILTIN: [Entry; 9] = [
+const BUILTIN: [Entry; 10] = [
     Entry::planner::<ValueIteration>(
         "value-iteration",
         &["kbvi-closed"],
@@ -34,6 +36,11 @@ const BUILTIN: [Entry; 9] = [
         "acts as if all uncertainty were gone after this step",
     ),
     Entry::planner::<Mls>("mls", &[], "acts as if the most likely state were certain"),
+    Entry::planner::<PointBased>(
+        "point-based",
+        &[],
+        "values of policies, backed up at beliefs on cells, for one or two variables",
+    ),
     Entry::planner::<CodebookPlanner>(
         "codebook",
         &[],

@@ -1,10 +1,11 @@
 //! Beliefs a policy meets, sampled from the model.
 
-use crate::belief::{Belief, BeliefSpace, Reading, Updater};
+use crate::belief::{Belief, BeliefSpace, Held, Reading, Updater};
 use crate::error::Result;
 use crate::model::ActionId;
 use crate::parallel;
 use crate::policy::Policy;
+use crate::random::{Rng, Role, stream, uniform};
 use crate::scenario::Scenario;
 use crate::simulate::{Agent, TrackingAgent, run_episode};
 use crate::solve::settings::ensure;
@@ -74,6 +75,103 @@ pub fn decisions(
         );
         agent.decisions
     })
+}
+
+/// A belief that a policy met, with what another policy expects of every action there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// The belief, as it is read.
+    pub belief: Belief,
+    /// By action: the return expected.
+    pub values: Vec<f64>,
+    /// How often an episode is expected to meet such a belief, discounted.
+    pub counts: f64,
+}
+
+/// Runs episodes as [`decisions`] does, of which some decisions are judged: about `most`, and the likelier the more a step counts. Empty
+/// if the judge does not look at beliefs in full. The same for any number of threads.
+pub fn judged(
+    space: &dyn BeliefSpace,
+    (policy, judge): (&dyn Policy, &dyn Policy),
+    (episodes, length): (usize, usize),
+    most: usize,
+    seed: u64,
+) -> Vec<Judged> {
+    let model = space.model();
+    let scenario = Scenario::assumed(model);
+    let updater = space.updater();
+    let counted: f64 = (0..length)
+        .map(|step| model.discount.powi(step as i32))
+        .sum();
+    let share = most as f64 / (episodes as f64 * counted);
+    let runs = parallel::map(episodes, |episode| {
+        let mut world = ProblemWorld::new(&scenario);
+        let mut agent = Judge {
+            held: updater.start(),
+            updater: &updater,
+            policy,
+            judge,
+            share,
+            discount: model.discount,
+            counts: 1.0 / episodes as f64,
+            whims: stream(seed, episode as u64, Role::Exploration),
+            judged: Vec::new(),
+        };
+        run_episode(
+            &mut world,
+            &mut agent,
+            &mut Streams::new(seed, episode as u64),
+            &mut Observation::new(model.observation_dim()),
+            (length, model.discount),
+            &mut |_, _| {},
+        );
+        agent.judged
+    });
+    runs.into_iter().flatten().collect()
+}
+
+/// An agent some of whose decisions are judged.
+struct Judge<'a> {
+    held: Held,
+    updater: &'a Updater,
+    policy: &'a dyn Policy,
+    judge: &'a dyn Policy,
+    /// Share of first decisions that is judged.
+    share: f64,
+    discount: f64,
+    /// How much the decision counts.
+    counts: f64,
+    whims: Rng,
+    judged: Vec<Judged>,
+}
+
+impl Agent for Judge<'_> {
+    fn reset(&mut self) {
+        self.updater.reset(&mut self.held);
+    }
+
+    fn act(&mut self) -> ActionId {
+        let likely = self.share.min(1.0);
+        if likely > 0.0 && uniform(&mut self.whims) < likely {
+            self.judged
+                .extend(self.judge.values_in_full(&self.held).map(|values| Judged {
+                    belief: self.held.belief().clone(),
+                    values,
+                    counts: self.counts / likely,
+                }));
+        }
+        self.share *= self.discount;
+        self.counts *= self.discount;
+        self.policy.action_in_full(&self.held)
+    }
+
+    fn observe(&mut self, action: ActionId, reading: Reading<'_>) {
+        self.updater.update(&mut self.held, action, reading);
+    }
+
+    fn belief(&self) -> &Belief {
+        self.held.belief()
+    }
 }
 
 /// An agent that writes down its decisions.

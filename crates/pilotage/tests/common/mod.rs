@@ -181,6 +181,8 @@ pub fn small(entry: &Entry, model: &Model) -> Solver {
         ("rounds", "1"),
         ("episodes", "5"),
         ("refined", "20"),
+        ("beliefs", "12"),
+        ("bins", "4"),
     ];
     let known = entry.settings();
     let has = |name: &str| known.iter().any(|info| info.name == name);

@@ -32,6 +32,9 @@ const ROUNDS: usize = 4;
 /// Most beliefs that are collected in a round.
 const MOST: usize = 40_000;
 
+/// Most beliefs in full that are judged in a round.
+const MOST_JUDGED: usize = 12_000;
+
 /// A leaf has at least this share of all weight.
 const LEAST: f64 = 2e-5;
 
@@ -44,6 +47,8 @@ struct Collected {
     costs: Vec<f64>,
     /// How much each belief counts: its discount, divided by the number of episodes.
     counts: Vec<f64>,
+    /// What the policy expects from each belief, where it knows.
+    values: Vec<Option<f64>>,
 }
 
 /// A leaf while the tree grows.
@@ -83,7 +88,9 @@ pub(super) fn grow(
         features: vec![Vec::new(); features.len()],
         costs: Vec::new(),
         counts: Vec::new(),
+        values: Vec::new(),
     };
+    let in_full = policy.values_in_full(&space.updater().start()).is_some();
     automaton.matching = Matching::Tree;
     for round in 0..ROUNDS {
         let imitator: &dyn Policy = if round == 0 {
@@ -91,27 +98,36 @@ pub(super) fn grow(
         } else {
             &automaton.clone()
         };
-        let runs = rollout::decisions(
-            space,
-            &space.updater(),
-            imitator,
-            episodes,
-            space.model().episode.length,
-            seed.wrapping_add(round as u64),
-        );
-        let discount = space.model().discount;
-        collected.add(&runs, policy, actions, discount, |belief, i| {
-            strata[belief.stratum].value(features[i], belief)
-        });
+        let length = space.model().episode.length;
+        let seed = seed.wrapping_add(round as u64);
+        let feature = |belief: &Belief, i: usize| strata[belief.stratum].value(features[i], belief);
+        if in_full {
+            let runs = (episodes, length);
+            let judged = rollout::judged(space, (imitator, policy), runs, MOST_JUDGED, seed);
+            for rollout::Judged {
+                belief,
+                values,
+                counts,
+            } in judged
+            {
+                let best = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let costs = values.into_iter().map(|value| counts * (best - value));
+                collected.push(belief, costs, counts, Some(best), feature);
+            }
+        } else {
+            let updater = space.updater();
+            let runs = rollout::decisions(space, &updater, imitator, episodes, length, seed);
+            collected.add(&runs, policy, actions, space.model().discount, feature);
+        }
         // What was collected so far is the return that episodes of all rounds lose together.
         let allowed = size.loss * value * (round + 1) as f64;
         let grown = Grown::new(&collected, actions, size.nodes, allowed);
-        grown.write(automaton, &collected, &features, policy);
+        grown.write(automaton, &collected, &features);
     }
     let of_size = |nodes: usize| {
         let mut tree = automaton.clone();
         let grown = Grown::new(&collected, actions, nodes, 0.0);
-        grown.write(&mut tree, &collected, &features, policy);
+        grown.write(&mut tree, &collected, &features);
         tree
     };
     *automaton = smallest(space, size, (episodes.min(TRIALS), seed), &of_size);
@@ -182,7 +198,7 @@ fn sizes(most: usize) -> Vec<usize> {
 const TRIALS: usize = 2000;
 
 /// Trees that may be no better than those before, one after the other, until no larger one is tried.
-const PATIENCE: usize = 4;
+const PATIENCE: usize = 6;
 
 /// A limit beyond which it need not be tried itself.
 const LARGE: usize = 500;
@@ -222,21 +238,32 @@ impl Collected {
             .filter(|(number, _)| number % stride == 0)
             .map(|(_, (step, decision))| (&decision.belief, share * discount.powi(step as i32)))
             .collect();
-        let costs = parallel::map(chosen.len(), |i| {
+        let judged = parallel::map(chosen.len(), |i| {
             let (belief, counts) = chosen[i];
-            costs(policy, belief, actions)
-                .into_iter()
-                .map(|cost| counts * cost)
-                .collect::<Vec<f64>>()
+            let costs = costs(policy, belief, actions).into_iter();
+            let costs: Vec<f64> = costs.map(|cost| counts * cost).collect();
+            (costs, policy.value(belief))
         });
-        for ((belief, counts), costs) in chosen.into_iter().zip(costs) {
-            for (i, values) in self.features.iter_mut().enumerate() {
-                values.push(feature(belief, i));
-            }
-            self.beliefs.push(belief.clone());
-            self.costs.extend(costs);
-            self.counts.push(counts);
+        for ((belief, counts), (costs, value)) in chosen.into_iter().zip(judged) {
+            self.push(belief.clone(), costs.into_iter(), counts, value, &feature);
         }
+    }
+
+    fn push(
+        &mut self,
+        belief: Belief,
+        costs: impl Iterator<Item = f64>,
+        counts: f64,
+        value: Option<f64>,
+        feature: impl Fn(&Belief, usize) -> f64,
+    ) {
+        for (i, values) in self.features.iter_mut().enumerate() {
+            values.push(feature(&belief, i));
+        }
+        self.beliefs.push(belief);
+        self.costs.extend(costs);
+        self.counts.push(counts);
+        self.values.push(value);
     }
 }
 
@@ -433,13 +460,7 @@ impl<'a> Grown<'a> {
     }
 
     /// Gives tests and nodes to an automaton, those that are reached, in the order of a walk through the tree.
-    fn write(
-        &self,
-        automaton: &mut Automaton,
-        collected: &Collected,
-        features: &[Feature],
-        policy: &dyn Policy,
-    ) {
+    fn write(&self, automaton: &mut Automaton, collected: &Collected, features: &[Feature]) {
         let mut tree = Tree::default();
         automaton.nodes.clear();
         let first = match self.tests.first() {
@@ -451,7 +472,7 @@ impl<'a> Grown<'a> {
             &mut tree,
             &mut |leaf: &Leaf| {
                 let id = automaton.nodes.len();
-                automaton.nodes.push(node(leaf, collected, policy));
+                automaton.nodes.push(node(leaf, collected));
                 id
             },
             features,
@@ -490,13 +511,12 @@ impl<'a> Grown<'a> {
 }
 
 /// The node of a leaf: where the beliefs that were met in it lie.
-fn node(leaf: &Leaf, collected: &Collected, policy: &dyn Policy) -> Node {
+fn node(leaf: &Leaf, collected: &Collected) -> Node {
     let members = || {
-        leaf.members
-            .iter()
-            .map(|member| &collected.beliefs[*member as usize])
+        let members = leaf.members.iter().map(|member| *member as usize);
+        members.map(|member| (&collected.beliefs[member], collected.values[member]))
     };
-    let n = members().next().map_or(0, |belief| belief.mean.len());
+    let n = members().next().map_or(0, |(belief, _)| belief.mean.len());
     let (mut lower, mut upper) = (vec![f64::INFINITY; n], vec![f64::NEG_INFINITY; n]);
     let mut middle = vec![0.0; n];
     let (mut first, mut last) = (usize::MAX, 0);
@@ -504,7 +524,7 @@ fn node(leaf: &Leaf, collected: &Collected, policy: &dyn Policy) -> Node {
     let mut value = 0.0;
     let mut known = true;
     let count = leaf.members.len().max(1) as f64;
-    for belief in members() {
+    for (belief, worth) in members() {
         for i in 0..n {
             lower[i] = lower[i].min(belief.mean[i]);
             upper[i] = upper[i].max(belief.mean[i]);
@@ -513,7 +533,7 @@ fn node(leaf: &Leaf, collected: &Collected, policy: &dyn Policy) -> Node {
         (first, last) = (first.min(belief.stratum), last.max(belief.stratum));
         modes.resize(modes.len().max(belief.mode + 1), 0);
         modes[belief.mode] += 1;
-        match policy.value(belief) {
+        match worth {
             Some(worth) => value += worth / count,
             None => known = false,
         }

@@ -63,7 +63,7 @@ impl Backup {
     }
 
     /// An action, and the best there is to go on with after it.
-    fn choice(&self, action: ActionId, point: &Point, set: &VectorSet) -> Choice {
+    pub(super) fn choice(&self, action: ActionId, point: &Point, set: &VectorSet) -> Choice {
         let keeping = &*self.keeping;
         let mut from = vec![0.0; keeping.states()];
         for (state, mass) in point.states.iter().zip(&point.masses) {

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::backup::Backup;
-use super::point::{Point, ValueVector, VectorSet};
+use super::point::{ValueVector, VectorSet};
 use crate::belief::Keeping;
 use crate::model::ActionId;
 use crate::parallel;

@@ -33,8 +33,8 @@ pub use policy::PointBasedPolicy;
 
 use super::refusals;
 use super::settings::{PAIRED, Settings, ensure, ensure_count};
-use super::solver::{refuse, refuse_if};
-use crate::belief::CellsKeeping;
+use super::solver::{Found, Plan, Planner, Problem, refuse, refuse_if};
+use crate::belief::{CellsKeeping, Codebook, Coded, CodedSpace, Keeping, Moments, Updater};
 use crate::error::Result;
 use crate::model::Model;
 use crate::progress::Progress;
@@ -43,6 +43,7 @@ use backup::Backup;
 use graph::Grapher;
 use improve::improve;
 use point::{Point, VectorSet};
+use policy::Read;
 use walk::{Met, Walker};
 
 /// Name of the solver in errors and policies.
@@ -56,6 +57,10 @@ const MOST_READINGS: usize = BINS.len();
 
 /// Rounds of backups between two times that beliefs are collected.
 const SWEEPS: usize = 12;
+
+/// How far apart the strata of a plan are at least, in units of the logarithm of a standard deviation, and how many there are at most.
+const APART: f64 = 0.05;
+const MOST_STRATA: usize = 200;
 
 /// Share of what a round has to gain that counts as a gain at a belief.
 const HARDLY: f64 = 0.01;
@@ -77,21 +82,18 @@ pub struct PointBased {
     pub bins: Option<usize>,
     /// Share of the value of a graph that one with fewer nodes may cost; 0 to 1.
     pub spare: f64,
-    /// Seed of the random numbers.
-    pub seed: u64,
 }
 
 impl Default for PointBased {
     fn default() -> Self {
         Self {
-            beliefs: 1000,
+            beliefs: 600,
             apart: 0.1,
             rounds: 20,
-            epsilon: 1e-3,
+            epsilon: 2e-3,
             exploration: 0.15,
             bins: None,
             spare: 2e-3,
-            seed: 1,
         }
     }
 }
@@ -123,6 +125,8 @@ pub struct PointBasedPlan {
     pub policy: PointBasedPolicy,
     /// The policy as a graph, if the sensor is discrete: what its nodes earn is its own value, beside that of the vectors.
     pub graph: Option<PolicyGraph>,
+    /// Strata by which its beliefs are read.
+    pub strata: Codebook,
     /// Beliefs at which values were backed up.
     pub beliefs: usize,
     /// Whether the last round gained less than it was told to.
@@ -167,6 +171,7 @@ fn ends_cost(model: &Model) -> Option<String> {
 pub fn solve(
     model: &Model,
     settings: &PointBased,
+    seed: u64,
     observer: &dyn Progress,
 ) -> Result<PointBasedPlan> {
     settings.validate()?;
@@ -181,23 +186,80 @@ pub fn solve(
     let search = Search {
         backup: &backup,
         settings,
+        seed,
         length: model.episode.length,
         observer,
     };
     let (met, set, converged) = search.run();
     let graph = search.graph(&set);
+    let strata = codebook(model, &backup.keeping, &met);
     Ok(PointBasedPlan {
         value: set.start,
         policy: PointBasedPolicy::new(backup, set),
         graph,
+        strata,
         beliefs: met.points.len(),
         converged,
     })
 }
 
+/// Strata that the beliefs of a plan are near to.
+fn codebook(model: &Model, keeping: &CellsKeeping, met: &Met) -> Codebook {
+    let moments = |point: &Point| {
+        let mut mass = vec![0.0; keeping.states()];
+        for (state, part) in point.states.iter().zip(&point.masses) {
+            mass[*state] = *part;
+        }
+        let mut moments = Moments::default();
+        keeping.moments(&keeping.belief(mass), &mut moments);
+        moments
+    };
+    let moments: Vec<Moments> = met.points.iter().map(moments).collect();
+    let mut codebook = Codebook::new(model);
+    codebook.cover(&moments, APART, MOST_STRATA);
+    codebook.sort();
+    codebook
+}
+
+impl Planner for PointBased {
+    fn name(&self) -> &'static str {
+        SOLVER
+    }
+
+    fn accepts(&self, model: &Model) -> Result<()> {
+        accepts(model)
+    }
+
+    fn needs_levels(&self) -> bool {
+        false
+    }
+
+    fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
+        let model = problem.model();
+        let found = solve(model, self, problem.seed(), observer)?;
+        let codebook = Arc::new(found.strata);
+        let keeping = Arc::clone(&found.policy.backup.keeping);
+        let updater = Updater::Cells(Coded::new(model, keeping, Arc::clone(&codebook)));
+        let space = CodedSpace::new(model, updater, &codebook);
+        let policy = Read {
+            policy: found.policy,
+            codebook,
+        };
+        Ok(Plan {
+            value: Some(found.value),
+            converged: found.converged,
+            ..Plan::of(Found::Rule {
+                policy: Box::new(policy),
+                space: Box::new(space),
+            })
+        })
+    }
+}
+
 struct Search<'a> {
     backup: &'a Backup,
     settings: &'a PointBased,
+    seed: u64,
     /// Steps of an episode.
     length: usize,
     observer: &'a dyn Progress,
@@ -205,12 +267,11 @@ struct Search<'a> {
 
 impl Search<'_> {
     fn rng(&self) -> Rng {
-        stream(self.settings.seed, u64::MAX, Role::Planner)
+        stream(self.seed, u64::MAX, Role::Planner)
     }
 
     /// The values of repeating one action for ever.
     fn blind(&self) -> VectorSet {
-        use crate::belief::Keeping;
         let actions = 0..self.backup.keeping.actions();
         let vectors = actions.map(|action| Arc::new(self.backup.blind(action)));
         VectorSet::new(vectors.collect(), &self.backup.start)
@@ -222,7 +283,7 @@ impl Search<'_> {
             vectors,
             exploration: self.settings.exploration,
             length: self.length,
-            seed: self.settings.seed,
+            seed: self.seed,
         }
     }
 

@@ -1,16 +1,19 @@
 //! Acting on beliefs kept as cells.
+//!
+//! What is kept in full is asked in full. Where only what it is read as is known, the belief with these moments takes its place.
 
 use std::sync::Arc;
 
 use super::backup::Backup;
 use super::point::{Point, ValueVector, VectorSet};
-use crate::belief::{Cells, CellsKeeping};
+use crate::belief::{Belief, Cells, CellsKeeping, Codebook, Held, Keeping, Moments};
 use crate::model::ActionId;
+use crate::policy::Policy;
 
 /// What to do at a belief, by the vectors of a plan.
 #[derive(Debug, Clone)]
 pub struct PointBasedPolicy {
-    backup: Backup,
+    pub(super) backup: Backup,
     set: VectorSet,
 }
 
@@ -40,11 +43,53 @@ impl PointBasedPolicy {
         self.set.vectors[best].action
     }
 
-    /// The action that is best by one look ahead at what may be sensed, and its value. It takes as long as a backup, and never promises
-    /// less than [`PointBasedPolicy::value`] at the beliefs of the plan.
-    pub fn look_ahead(&self, belief: &Cells) -> (ActionId, f64) {
+    /// What each action is worth by one look ahead at what may be sensed. It takes as long as a backup, and the best is never worth less
+    /// than [`PointBasedPolicy::value`] at the beliefs of the plan.
+    pub fn look_ahead(&self, belief: &Cells) -> Vec<f64> {
         let point = Point::new(belief.probabilities());
-        let choice = self.backup.choose(&point, &self.set);
-        (choice.action, choice.value)
+        let actions = 0..self.backup.keeping.actions();
+        actions
+            .map(|action| self.backup.choice(action, &point, &self.set).value)
+            .collect()
+    }
+}
+
+/// The vectors, for beliefs that are read by a codebook.
+#[derive(Debug, Clone)]
+pub(super) struct Read {
+    pub(super) policy: PointBasedPolicy,
+    pub(super) codebook: Arc<Codebook>,
+}
+
+impl Read {
+    fn cells(&self, belief: &Belief) -> Cells {
+        let last = self.codebook.len().saturating_sub(1);
+        let stratum = self.codebook.stratum(belief.stratum.min(last));
+        self.policy.keeping().with_moments(&Moments {
+            mean: belief.mean.clone(),
+            covariance: stratum.covariance.clone(),
+            weights: stratum.weights.clone(),
+        })
+    }
+}
+
+impl Policy for Read {
+    fn action(&self, belief: &Belief) -> ActionId {
+        self.policy.action(&self.cells(belief))
+    }
+
+    fn action_in_full(&self, held: &Held) -> ActionId {
+        match held.cells() {
+            Some(cells) => self.policy.action(cells),
+            None => self.action(held.belief()),
+        }
+    }
+
+    fn values_in_full(&self, held: &Held) -> Option<Vec<f64>> {
+        held.cells().map(|cells| self.policy.look_ahead(cells))
+    }
+
+    fn value(&self, belief: &Belief) -> Option<f64> {
+        Some(self.policy.value(&self.cells(belief)))
     }
 }

@@ -51,7 +51,7 @@ fn earned_by_vectors(
         episodes,
         || keeping.start(),
         |full: &mut Cells| match ahead {
-            true => policy.look_ahead(full).0,
+            true => crate::policy::first_best(&policy.look_ahead(full)),
             false => policy.action(full),
         },
         |full, action, reading| match reading {
@@ -152,7 +152,7 @@ fn the_tiger_problem_has_its_known_value() {
         rounds: 60,
         ..PointBased::default()
     };
-    let plan = solve(&scenario.model, &settings, &Silent).unwrap();
+    let plan = solve(&scenario.model, &settings, 1, &Silent).unwrap();
     let graph = plan.graph.as_ref().unwrap();
     assert!((plan.value - exact).abs() < 1e-3, "{} {exact}", plan.value);
     assert!(
@@ -225,7 +225,7 @@ fn quick() -> PointBased {
 fn no_more_is_promised_than_is_earned() {
     for (sensor, least) in [(BINARY, 2.5), (GRADED, 3.0)] {
         let scenario = light(104, sensor);
-        let plan = solve(&scenario.model, &quick(), &Silent).unwrap();
+        let plan = solve(&scenario.model, &quick(), 1, &Silent).unwrap();
         assert!(plan.value > least, "{sensor}: {}", plan.value);
         let (mean, error) = earned_by_vectors(&scenario, &plan, 4000, false);
         assert!(
@@ -256,7 +256,7 @@ fn threads_change_nothing() {
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         let pool = pool.build().unwrap();
-        pool.install(|| solve(&scenario.model, &settings, &Silent).unwrap())
+        pool.install(|| solve(&scenario.model, &settings, 1, &Silent).unwrap())
     };
     let (one, two) = (with(1), with(2));
     assert_eq!(one.value.to_bits(), two.value.to_bits());
@@ -267,7 +267,7 @@ fn threads_change_nothing() {
 fn what_cannot_be_planned_is_refused_with_what_would_do() {
     for (name, said) in [("cart-pole", "state variables"), ("scalar-lqg", "discount")] {
         let model = find(name).unwrap().model;
-        let error = solve(&model, &PointBased::default(), &Silent).unwrap_err();
+        let error = solve(&model, &PointBased::default(), 1, &Silent).unwrap_err();
         assert!(error.to_string().contains(said), "{error}");
     }
     let settings = PointBased {
@@ -276,79 +276,4 @@ fn what_cannot_be_planned_is_refused_with_what_would_do() {
     };
     assert!(settings.validate().is_err());
     assert!(PointBased::default().validate().is_ok());
-}
-
-/// Says how it goes.
-struct Loud(std::time::Instant);
-
-impl Progress for Loud {
-    fn status(&self, message: &str) {
-        println!("  {:.1} s {message}", self.0.elapsed().as_secs_f64());
-    }
-}
-
-fn report(name: &str, scenario: &Scenario, settings: &PointBased, episodes: usize) {
-    let begun = std::time::Instant::now();
-    let plan = solve(&scenario.model, settings, &Loud(begun)).unwrap();
-    let took = begun.elapsed().as_secs_f64();
-    println!(
-        "{name}: planned {:.4} in {took:.1} s, {} beliefs, {} vectors, converged {}",
-        plan.value,
-        plan.beliefs,
-        plan.policy.vectors().len(),
-        plan.converged
-    );
-    println!(
-        "  by vectors {:.4?}",
-        earned_by_vectors(scenario, &plan, episodes, false)
-    );
-    println!(
-        "  one look ahead {:.4?}",
-        earned_by_vectors(scenario, &plan, episodes / 5, true)
-    );
-    if let Some(graph) = &plan.graph {
-        let earned = earned_by_graph(scenario, graph, episodes);
-        println!(
-            "  graph: {} nodes, value {:.4}, earned {earned:.4?}",
-            graph.nodes.len(),
-            graph.value
-        );
-    }
-}
-
-#[test]
-#[ignore = "measures"]
-fn measure_binary_light() {
-    let cells = std::env::var("CELLS").unwrap_or("104 200 208".to_owned());
-    for cells in cells.split(' ').map(|cells| cells.parse().unwrap()) {
-        report(
-            &format!("binary {cells}"),
-            &binary_light(cells),
-            &PointBased::default(),
-            10_000,
-        );
-    }
-}
-
-fn measured() -> PointBased {
-    let rounds = std::env::var("ROUNDS").map_or(20, |rounds| rounds.parse().unwrap());
-    PointBased {
-        rounds,
-        ..PointBased::default()
-    }
-}
-
-#[test]
-#[ignore = "measures"]
-fn measure_graded_light() {
-    report("graded", &light(208, GRADED), &measured(), 10_000);
-}
-
-#[test]
-#[ignore = "measures"]
-fn measure_built_in() {
-    let names = std::env::var("MODELS").unwrap_or("cart-load-unload corridor".to_owned());
-    for name in names.split(' ') {
-        report(name, &find(name).unwrap(), &measured(), 4000);
-    }
 }
