@@ -253,6 +253,8 @@ fn every_model_has_a_solver_and_every_solver_a_model() {
     for (name, expected) in [
         ("corridor", "value-iteration"),
         ("cart-pole", "policy-search"),
+        ("light-dark-5", "point-based"),
+        ("light-dark-2d", "codebook"),
         ("scalar-lqg", "value-iteration"),
     ] {
         assert_eq!(first(&scenario::find(name).unwrap().model), expected);

@@ -196,14 +196,16 @@ impl Registry {
             })
     }
 
-    /// The first planner that accepts a model with its default settings.
+    /// The first planner that accepts a model with its default settings, of those that it suits if there are any.
     ///
     /// # Errors
     /// What the first of all says against the model, if all of them refuse it.
     pub fn first_for(&self, model: &Model) -> Result<&Entry> {
         let planners = || self.entries.iter().filter(|entry| !entry.learns);
-        let accepting = planners().find(|entry| entry.accepts(model).is_ok());
-        match (accepting, planners().next()) {
+        let accepting = || planners().filter(|entry| entry.accepts(model).is_ok());
+        let suits = |entry: &&Entry| entry.solver(&[]).is_ok_and(|solver| solver.suits(model));
+        let chosen = accepting().find(suits).or_else(|| accepting().next());
+        match (chosen, planners().next()) {
             (Some(entry), _) => Ok(entry),
             (None, Some(first)) => {
                 first.accepts(model)?;

@@ -23,6 +23,12 @@ pub trait Planner: Send + Sync {
     /// [`Error::Unsupported`] with the reason, and what would do.
     fn accepts(&self, model: &Model) -> Result<()>;
 
+    /// Whether it is one to try first for a model that it accepts: it finds something good in a minute or two.
+    fn suits(&self, model: &Model) -> bool {
+        let _ = model;
+        true
+    }
+
     /// Whether it plans on the uncertainty levels of a linear model; one that does not is handed models of any kind.
     fn needs_levels(&self) -> bool {
         true
@@ -113,6 +119,14 @@ impl Solver {
                 refuse_if(learner.name(), model, refusals::beyond_levels(model))?;
                 learner.accepts(model)
             }
+        }
+    }
+
+    /// Whether it is one to try first for a model that it accepts.
+    pub fn suits(&self, model: &Model) -> bool {
+        match self {
+            Self::Planner(planner) => planner.suits(model),
+            Self::Learner(_) => false,
         }
     }
 

@@ -68,19 +68,19 @@ const HARDLY: f64 = 0.01;
 /// What point-based value iteration can be told.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PointBased {
-    /// Most beliefs at which values are backed up; 1 to 10000.
+    /// Most beliefs at which values are backed up; at least 1, at most 10000.
     pub beliefs: usize,
-    /// Sum of the differences of probabilities by which two of them are apart at least; 0 to 2.
+    /// Sum of the differences of probabilities by which two of them are apart; at least 0, at most 2.
     pub apart: f64,
     /// Most times that beliefs are collected and backed up; at least 1, at most 10000.
     pub rounds: usize,
-    /// Share of the value of the start; a round that gains less is the last one. Above 0.
+    /// Share of the value of the start; a round that gains less is the last one; more than 0.
     pub epsilon: f64,
-    /// Probability of another action than the best where beliefs are collected; 0 to 1.
+    /// Probability of another action than the best where beliefs are collected; at least 0, at most 1.
     pub exploration: f64,
     /// Most bins along a reading, at least 2, at most 10000; `auto` for 40 of one reading and 12 of two.
     pub bins: Option<usize>,
-    /// Share of the value of a graph that one with fewer nodes may cost; 0 to 1.
+    /// Share of the value of a graph that one with fewer nodes may cost; at least 0, at most 1.
     pub spare: f64,
 }
 
@@ -228,6 +228,11 @@ impl Planner for PointBased {
 
     fn accepts(&self, model: &Model) -> Result<()> {
         accepts(model)
+    }
+
+    /// Cells of two variables are many.
+    fn suits(&self, model: &Model) -> bool {
+        model.state_dim() == 1
     }
 
     fn needs_levels(&self) -> bool {

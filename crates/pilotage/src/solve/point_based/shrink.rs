@@ -44,15 +44,6 @@ pub(super) fn shrunk(grapher: &Grapher<'_>, mut graph: PolicyGraph, floor: f64) 
         for _ in 0..TRIES {
             let next = worth.without(grapher, &graph, spared);
             let fewer = next.nodes.len() < graph.nodes.len();
-            if std::env::var("SHRINK").is_ok() {
-                eprintln!(
-                    "{} - {spared} -> {} {} {}",
-                    graph.nodes.len(),
-                    next.nodes.len(),
-                    graph.value,
-                    next.value
-                );
-            }
             if next.value >= floor && (fewer || next.value > graph.value) {
                 smaller = Some(next);
                 break;
