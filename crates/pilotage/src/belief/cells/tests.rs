@@ -262,6 +262,8 @@ fn whole_numbers_and_signals_are_exact() {
         [actions]
         UP = { u = [1.0] }
         STAY = { u = [0.0] }
+        [belief]
+        walls = "clip"
         [[reward]]
         in = { x = [4.0, 5.0] }
         value = 1.0
