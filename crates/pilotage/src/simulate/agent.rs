@@ -1,6 +1,6 @@
 //! Agents: a belief and a policy, put together so that they can act.
 
-use crate::belief::{Belief, Reading, Tracker, Tracking};
+use crate::belief::{Belief, Held, Reading, Tracker, Tracking};
 use crate::model::ActionId;
 use crate::policy::Policy;
 
@@ -37,6 +37,11 @@ impl<'a> TrackingAgent<'a> {
             tracker: tracking.tracker(),
             policy,
         }
+    }
+
+    /// What it believes now as it is held, where more is known of it than what a policy reads.
+    pub fn held(&self) -> Option<&Held> {
+        self.tracker.held()
     }
 }
 

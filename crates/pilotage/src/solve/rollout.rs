@@ -1,8 +1,8 @@
 //! Beliefs a policy meets, sampled from the model.
 
-use crate::belief::{Belief, BeliefSpace, Held, Reading, Updater};
+use crate::belief::{Belief, BeliefSpace, Reading, Updater};
 use crate::error::Result;
-use crate::model::ActionId;
+use crate::model::{ActionId, Model};
 use crate::parallel;
 use crate::policy::Policy;
 use crate::random::{Rng, Role, stream, uniform};
@@ -63,18 +63,27 @@ pub fn decisions(
             sensed: Vec::new(),
             decisions: Vec::new(),
         };
-        let mut observation = Observation::new(model.observation_dim());
-        let mut draws = Streams::new(seed, episode as u64);
-        run_episode(
-            &mut world,
-            &mut agent,
-            &mut draws,
-            &mut observation,
-            (length, model.discount),
-            &mut |_, _| {},
-        );
+        follow(model, &mut world, &mut agent, length, (seed, episode));
         agent.decisions
     })
+}
+
+/// Runs an episode that is told by a seed and its number.
+fn follow(
+    model: &Model,
+    world: &mut ProblemWorld,
+    agent: &mut dyn Agent,
+    length: usize,
+    (seed, episode): (u64, usize),
+) {
+    run_episode(
+        world,
+        agent,
+        &mut Streams::new(seed, episode as u64),
+        &mut Observation::new(model.observation_dim()),
+        (length, model.discount),
+        &mut |_, _| {},
+    );
 }
 
 /// A belief that a policy met, with what another policy expects of every action there.
@@ -107,9 +116,7 @@ pub fn judged(
     let runs = parallel::map(episodes, |episode| {
         let mut world = ProblemWorld::new(&scenario);
         let mut agent = Judge {
-            held: updater.start(),
-            updater: &updater,
-            policy,
+            inner: TrackingAgent::new(&updater, policy),
             judge,
             share,
             discount: model.discount,
@@ -117,14 +124,7 @@ pub fn judged(
             whims: stream(seed, episode as u64, Role::Exploration),
             judged: Vec::new(),
         };
-        run_episode(
-            &mut world,
-            &mut agent,
-            &mut Streams::new(seed, episode as u64),
-            &mut Observation::new(model.observation_dim()),
-            (length, model.discount),
-            &mut |_, _| {},
-        );
+        follow(model, &mut world, &mut agent, length, (seed, episode));
         agent.judged
     });
     runs.into_iter().flatten().collect()
@@ -132,9 +132,7 @@ pub fn judged(
 
 /// An agent some of whose decisions are judged.
 struct Judge<'a> {
-    held: Held,
-    updater: &'a Updater,
-    policy: &'a dyn Policy,
+    inner: TrackingAgent<'a>,
     judge: &'a dyn Policy,
     /// Share of first decisions that is judged.
     share: f64,
@@ -147,30 +145,31 @@ struct Judge<'a> {
 
 impl Agent for Judge<'_> {
     fn reset(&mut self) {
-        self.updater.reset(&mut self.held);
+        self.inner.reset();
     }
 
     fn act(&mut self) -> ActionId {
         let likely = self.share.min(1.0);
         if likely > 0.0 && uniform(&mut self.whims) < likely {
-            self.judged
-                .extend(self.judge.values_in_full(&self.held).map(|values| Judged {
-                    belief: self.held.belief().clone(),
-                    values,
-                    counts: self.counts / likely,
-                }));
+            let held = self.inner.held();
+            let values = held.and_then(|held| self.judge.values_in_full(held));
+            self.judged.extend(values.map(|values| Judged {
+                belief: self.inner.belief().clone(),
+                values,
+                counts: self.counts / likely,
+            }));
         }
         self.share *= self.discount;
         self.counts *= self.discount;
-        self.policy.action_in_full(&self.held)
+        self.inner.act()
     }
 
     fn observe(&mut self, action: ActionId, reading: Reading<'_>) {
-        self.updater.update(&mut self.held, action, reading);
+        self.inner.observe(action, reading);
     }
 
     fn belief(&self) -> &Belief {
-        self.held.belief()
+        self.inner.belief()
     }
 }
 

@@ -40,7 +40,6 @@ use crate::model::Model;
 use crate::progress::Progress;
 use crate::random::{Rng, Role, stream};
 use backup::Backup;
-use graph::Grapher;
 use improve::improve;
 use point::{Point, VectorSet};
 use policy::Read;
@@ -80,8 +79,6 @@ pub struct PointBased {
     pub exploration: f64,
     /// Most bins along a reading, at least 2, at most 10000; `auto` for 40 of one reading and 12 of two.
     pub bins: Option<usize>,
-    /// Share of the value of a graph that one with fewer nodes may cost; at least 0, at most 1.
-    pub spare: f64,
 }
 
 impl Default for PointBased {
@@ -93,7 +90,6 @@ impl Default for PointBased {
             epsilon: 2e-3,
             exploration: 0.15,
             bins: None,
-            spare: 2e-3,
         }
     }
 }
@@ -109,8 +105,6 @@ impl Settings for PointBased {
         ensure("apart", self.apart, fits, "from 0 to 2")?;
         let fits = (0.0..=1.0).contains(&self.exploration);
         ensure("exploration", self.exploration, fits, "from 0 to 1")?;
-        let fits = (0.0..=1.0).contains(&self.spare);
-        ensure("spare", self.spare, fits, "from 0 to 1")?;
         let fits = self.epsilon > 0.0 && self.epsilon.is_finite();
         ensure("epsilon", self.epsilon, fits, "above 0")
     }
@@ -123,8 +117,6 @@ pub struct PointBasedPlan {
     pub value: f64,
     /// What to do at a belief.
     pub policy: PointBasedPolicy,
-    /// The policy as a graph, if the sensor is discrete: what its nodes earn is its own value, beside that of the vectors.
-    pub graph: Option<PolicyGraph>,
     /// Strata by which its beliefs are read.
     pub strata: Codebook,
     /// Beliefs at which values were backed up.
@@ -191,12 +183,10 @@ pub fn solve(
         observer,
     };
     let (met, set, converged) = search.run();
-    let graph = search.graph(&set);
     let strata = codebook(model, &backup.keeping, &met);
     Ok(PointBasedPlan {
         value: set.start,
         policy: PointBasedPolicy::new(backup, set),
-        graph,
         strata,
         beliefs: met.points.len(),
         converged,
@@ -341,24 +331,5 @@ impl Search<'_> {
             }
         }
         set
-    }
-
-    /// The policy as a graph.
-    fn graph(&self, set: &VectorSet) -> Option<PolicyGraph> {
-        if !self.backup.keeping.is_discrete() {
-            return None;
-        }
-        let grapher = Grapher::new(self.backup);
-        let graph = graph::merged(grapher.of(set));
-        let told = |graph: &PolicyGraph| {
-            let nodes = graph.nodes.len();
-            let status = format!("{nodes} nodes, value {:.4}", graph.value);
-            self.observer.status(&status);
-        };
-        told(&graph);
-        let floor = graph.value - self.settings.spare * graph.value.abs();
-        let graph = shrink::shrunk(&grapher, graph, floor);
-        told(&graph);
-        Some(graph)
     }
 }

@@ -5,10 +5,13 @@
 use std::sync::Arc;
 
 use super::backup::Backup;
+use super::graph::{self, Grapher, PolicyGraph};
 use super::point::{Point, ValueVector, VectorSet};
+use super::shrink;
 use crate::belief::{Belief, Cells, CellsKeeping, Codebook, Held, Keeping, Moments};
 use crate::model::ActionId;
 use crate::policy::Policy;
+use crate::progress::Progress;
 
 /// What to do at a belief, by the vectors of a plan.
 #[derive(Debug, Clone)]
@@ -41,6 +44,25 @@ impl PointBasedPolicy {
     pub fn action(&self, belief: &Cells) -> ActionId {
         let best = self.set.best(&Point::new(belief.probabilities())).0;
         self.set.vectors[best].action
+    }
+
+    /// The policy as a graph, if the sensor is discrete: what its nodes earn is its own value, beside that of the vectors. For fewer nodes
+    /// it may be worth less, by the share `spare` of its value.
+    pub fn graph(&self, spare: f64, observer: &dyn Progress) -> Option<PolicyGraph> {
+        if !self.backup.keeping.is_discrete() {
+            return None;
+        }
+        let grapher = Grapher::new(&self.backup);
+        let graph = graph::merged(grapher.of(&self.set));
+        let told = |graph: &PolicyGraph| {
+            let nodes = graph.nodes.len();
+            observer.status(&format!("{nodes} nodes, value {:.4}", graph.value));
+        };
+        told(&graph);
+        let floor = graph.value - spare * graph.value.abs();
+        let graph = shrink::shrunk(&grapher, graph, floor);
+        told(&graph);
+        Some(graph)
     }
 
     /// What each action is worth by one look ahead at what may be sensed. It takes as long as a backup, and the best is never worth less
