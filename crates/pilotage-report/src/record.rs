@@ -108,7 +108,7 @@ fn run(
             mode: mode_name(model, mode),
             hypotheses,
             valid,
-            node: automaton.matched(agent.belief()).unwrap_or(0),
+            node: agent.node(automaton).unwrap_or(0),
             action: String::new(),
             reward: 0.0,
         }

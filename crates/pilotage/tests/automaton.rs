@@ -139,7 +139,7 @@ proptest! {
             let automaton = compile(&pieces, &mdp, "test", &settings).unwrap();
             let met = rollout::decisions(
                 &mdp, &mdp.filter().into(), &pieces, settings.episodes, model.episode.length, settings.seed);
-            let means = || met.iter().flatten().map(|decision| decision.belief.mean[0]);
+            let means = || met.iter().flatten().map(|decision| decision.at.mean[0]);
             let (low, high) = (means().fold(f64::INFINITY, f64::min), means().fold(f64::NEG_INFINITY, f64::max));
             let inside: Vec<f64> = pieces.borders.iter().copied().filter(|x| low < *x && *x < high).collect();
             let near = inside.iter().flat_map(|border| [border - 1e-9, border + 1e-9]);

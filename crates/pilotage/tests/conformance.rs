@@ -105,11 +105,11 @@ fn check_automaton(mdp: &dyn BeliefSpace, automaton: &Automaton, what: &str) {
     for run in rollout::decisions(mdp, &automaton.updater, automaton, 3, length, 5) {
         let mut controller = AutomatonRunner::new(automaton);
         // A model with several starts is run from each; the controller begins at the first. Signals are not written down.
-        if run[0].belief != *controller.belief() || automaton.updater.readings() == 0 || !certain {
+        if run[0].at != *controller.belief() || automaton.updater.readings() == 0 || !certain {
             continue;
         }
         for (now, next) in run.iter().zip(run.iter().skip(1)) {
-            assert_eq!(controller.belief(), &now.belief, "{what}");
+            assert_eq!(controller.belief(), &now.at, "{what}");
             assert_eq!(controller.decide().1, now.action, "{what}");
             if next.observation.is_empty() {
                 controller.reset();

@@ -44,7 +44,7 @@ pub struct Arrow {
 impl Choice {
     /// Chooses.
     pub fn of(automaton: &Automaton) -> Self {
-        let start = automaton.matched(automaton.updater.start().belief());
+        let start = automaton.matched_in_full(&automaton.updater.start());
         let visits = |id: NodeId| automaton.nodes[id].visits;
         let mut nodes: Vec<NodeId> = (0..automaton.nodes.len()).collect();
         nodes.sort_by(|&a, &b| {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::codebook::Codebook;
-use super::full::{Keeping, Moments};
+use super::full::{Acted, Keeping, Moments};
 use super::{
     Belief, BeliefMdp, BeliefSpace, Cells, CellsKeeping, CodedSpace, Filter, Reading, SumKeeping,
     Tracker, Tracking,
@@ -112,8 +112,22 @@ impl<K: Keeping> Coded<K> {
         action: ActionId,
         reading: Reading<'_>,
     ) {
+        self.act(running, action);
+        self.sense(running, read, action, reading);
+    }
+
+    fn act(&self, running: &mut Running<K::Full>, action: ActionId) -> Acted {
+        self.keeping.act(&mut running.full, action, running.step)
+    }
+
+    fn sense(
+        &self,
+        running: &mut Running<K::Full>,
+        read: &mut Belief,
+        action: ActionId,
+        reading: Reading<'_>,
+    ) {
         let step = running.step;
-        self.keeping.act(&mut running.full, action, step);
         self.keeping.sense(&mut running.full, action, step, reading);
         running.step += 1;
         self.read(running, read);
@@ -253,10 +267,44 @@ impl Updater {
     }
 }
 
+/// A belief in full takes in a step in two halves, so that what an action is expected to pay can be known before anything is sensed.
+impl Updater {
+    /// Takes an action, and says what it is expected to pay and to do. Until [`Updater::sense`] follows the belief is not read anew.
+    /// `None`, and nothing is done, where beliefs are not kept in full.
+    pub fn act(&self, held: &mut Held, action: ActionId) -> Option<Acted> {
+        match (self, &mut held.kept) {
+            (Self::Sum(coded), Kept::Sum(running)) => Some(coded.act(running, action)),
+            (Self::Cells(coded), Kept::Cells(running)) => Some(coded.act(running, action)),
+            _ => None,
+        }
+    }
+
+    /// Takes in what was sensed after an action that [`Updater::act`] has taken.
+    pub fn sense(&self, held: &mut Held, action: ActionId, reading: Reading<'_>) {
+        let read = &mut held.read;
+        match (self, &mut held.kept) {
+            (Self::Sum(coded), Kept::Sum(running)) => coded.sense(running, read, action, reading),
+            (Self::Cells(coded), Kept::Cells(running)) => {
+                coded.sense(running, read, action, reading);
+            }
+            _ => {}
+        }
+    }
+}
+
 impl Held {
     /// As a policy reads it.
     pub fn belief(&self) -> &Belief {
         &self.read
+    }
+
+    /// Mean, covariance and probabilities of modes of the belief itself, where it is kept in full.
+    pub fn moments(&self) -> Option<&Moments> {
+        match &self.kept {
+            Kept::Linear { .. } => None,
+            Kept::Sum(running) => Some(&running.moments),
+            Kept::Cells(running) => Some(&running.moments),
+        }
     }
 
     /// Probabilities of cells, where these are what is kept.

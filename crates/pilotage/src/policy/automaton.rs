@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::belief::{Belief, BeliefSpace, StratumId, Updater};
+use crate::belief::{Belief, BeliefSpace, Held, StratumId, Updater};
 use crate::model::{ActionId, Fingerprint, ModeId, Model};
 use crate::policy::{Coordinates, Policy, StratumFeatures, Tree};
 
@@ -234,11 +234,11 @@ impl Automaton {
         self.updater.space(model)
     }
 
-    /// The node of a belief; `None` only without nodes.
+    /// The node of a belief by what it is read as; `None` only without nodes.
     pub fn matched(&self, belief: &Belief) -> Option<NodeId> {
         if let Some(tree) = &self.tree {
             let features = StratumFeatures::of(self, belief.stratum);
-            return (!self.nodes.is_empty()).then(|| tree.find(&features, belief));
+            return (!self.nodes.is_empty()).then(|| tree.find(&(&features, belief)));
         }
         let candidates = self.candidates(belief.stratum, belief.mode);
         match &self.coordinates {
@@ -307,6 +307,11 @@ impl Automaton {
 impl Policy for Automaton {
     fn action(&self, belief: &Belief) -> ActionId {
         self.matched(belief).map_or(0, |id| self.nodes[id].action)
+    }
+
+    fn action_in_full(&self, held: &Held) -> ActionId {
+        let matched = self.matched_in_full(held);
+        matched.map_or(0, |id| self.nodes[id].action)
     }
 
     fn value(&self, belief: &Belief) -> Option<f64> {

@@ -21,7 +21,7 @@ pub use automaton::{Automaton, Matching, Node, NodeId, Observed, Place};
 pub use coordinates::{Coordinates, MOST_COORDINATES};
 pub use file::schema;
 pub use runner::AutomatonRunner;
-pub(crate) use tree::StratumFeatures;
+pub(crate) use tree::{Asked, StratumFeatures};
 pub use tree::{Branch, Feature, Test, Tree};
 
 use crate::belief::{Belief, Held};

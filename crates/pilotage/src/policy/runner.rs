@@ -106,7 +106,7 @@ impl AutomatonRunner {
 
     /// Node and action at the current belief.
     pub fn decide(&self) -> (NodeId, ActionId) {
-        self.decide_at(self.held.belief())
+        self.decide_in_full(&self.held)
     }
 
     /// Takes in what was sensed after an action.
@@ -114,10 +114,20 @@ impl AutomatonRunner {
         self.updater.update(&mut self.held, action, reading.into());
     }
 
+    fn decide_in_full(&self, held: &Held) -> (NodeId, ActionId) {
+        match (&self.tree, held.moments()) {
+            (Some((tree, _)), Some(moments)) => self.node(tree.find(moments)),
+            _ => self.decide_at(held.belief()),
+        }
+    }
+
+    fn node(&self, id: NodeId) -> (NodeId, ActionId) {
+        self.nodes.get(id).copied().unwrap_or((0, 0))
+    }
+
     fn decide_at(&self, belief: &Belief) -> (NodeId, ActionId) {
         if let Some((tree, features)) = &self.tree {
-            let node = tree.find(&features[belief.stratum], belief);
-            return self.nodes.get(node).copied().unwrap_or((0, 0));
+            return self.node(tree.find(&(&features[belief.stratum], belief)));
         }
         let (from, to) = self
             .ranges
@@ -200,5 +210,9 @@ fn least(mut lanes: [f64; LANES]) -> f64 {
 impl Policy for AutomatonRunner {
     fn action(&self, belief: &Belief) -> ActionId {
         self.decide_at(belief).1
+    }
+
+    fn action_in_full(&self, held: &Held) -> ActionId {
+        self.decide_in_full(held).1
     }
 }

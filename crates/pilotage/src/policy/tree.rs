@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Automaton, NodeId};
-use crate::belief::{Belief, StratumId};
+use crate::belief::{Belief, Held, Moments, StratumId};
 use crate::model::ModeId;
 
 /// Something about a belief that a tree asks for.
@@ -13,9 +13,9 @@ use crate::model::ModeId;
 pub enum Feature {
     /// The mean of a state variable.
     Mean(usize),
-    /// Its standard deviation at the belief's stratum.
+    /// Its standard deviation: that of the belief where it is kept in full, else that of its uncertainty level.
     Deviation(usize),
-    /// Probability of a mode at the stratum; 1 or 0 where one mode is believed.
+    /// Probability of a mode; 1 or 0 where one mode is believed.
     Mode(ModeId),
 }
 
@@ -50,6 +50,26 @@ pub struct Tree {
     pub tests: Vec<Test>,
 }
 
+/// Whatever can be asked for the features of a belief.
+pub(crate) trait Asked {
+    /// What a feature is.
+    fn feature(&self, feature: Feature) -> f64;
+}
+
+/// A belief in full answers for itself.
+impl Asked for Moments {
+    fn feature(&self, feature: Feature) -> f64 {
+        match feature {
+            Feature::Mean(variable) => self.mean[variable],
+            Feature::Deviation(variable) => {
+                let variance = self.covariance[variable * (self.mean.len() + 1)];
+                variance.max(0.0).sqrt()
+            }
+            Feature::Mode(mode) => self.weights[mode],
+        }
+    }
+}
+
 /// What a tree may ask of the beliefs of a stratum, means apart.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StratumFeatures {
@@ -57,6 +77,21 @@ pub(crate) struct StratumFeatures {
     pub deviations: Vec<f64>,
     /// Probability of each mode; `None` where one is believed.
     pub weights: Option<Vec<f64>>,
+}
+
+/// A belief as it is read: its stratum answers for all but its mean.
+impl Asked for (&StratumFeatures, &Belief) {
+    fn feature(&self, feature: Feature) -> f64 {
+        let (stratum, belief) = self;
+        match feature {
+            Feature::Mean(variable) => belief.mean[variable],
+            Feature::Deviation(variable) => stratum.deviations[variable],
+            Feature::Mode(mode) => match &stratum.weights {
+                Some(weights) => weights[mode],
+                None => f64::from(belief.mode == mode),
+            },
+        }
+    }
 }
 
 impl StratumFeatures {
@@ -71,38 +106,40 @@ impl StratumFeatures {
             weights: codebook.map(|codebook| codebook.stratum(stratum).weights.clone()),
         }
     }
-
-    /// What a feature is at a belief of the stratum.
-    pub(crate) fn value(&self, feature: Feature, belief: &Belief) -> f64 {
-        match feature {
-            Feature::Mean(variable) => belief.mean[variable],
-            Feature::Deviation(variable) => self.deviations[variable],
-            Feature::Mode(mode) => match &self.weights {
-                Some(weights) => weights[mode],
-                None => f64::from(belief.mode == mode),
-            },
-        }
-    }
 }
 
 impl Tree {
-    /// The node of a belief at a stratum with these features.
-    pub(crate) fn find(&self, features: &StratumFeatures, belief: &Belief) -> NodeId {
-        let mut branch = match self.tests.is_empty() {
-            true => Branch::Node(0),
-            false => Branch::Test(0),
-        };
+    /// The node of a belief.
+    pub(crate) fn find(&self, belief: &impl Asked) -> NodeId {
+        let mut branch = self.first();
         loop {
             match branch {
                 Branch::Node(node) => return node,
                 Branch::Test(test) => {
                     let test = &self.tests[test];
-                    branch = match features.value(test.feature, belief) < test.less_than {
+                    branch = match belief.feature(test.feature) < test.less_than {
                         true => test.yes,
                         false => test.no,
                     };
                 }
             }
+        }
+    }
+
+    fn first(&self) -> Branch {
+        match self.tests.is_empty() {
+            true => Branch::Node(0),
+            false => Branch::Test(0),
+        }
+    }
+}
+
+impl Automaton {
+    /// The node of a belief as it is held: a tree asks the belief in full where there is one. `None` only without nodes.
+    pub fn matched_in_full(&self, held: &Held) -> Option<NodeId> {
+        match (&self.tree, held.moments()) {
+            (Some(tree), Some(moments)) => (!self.nodes.is_empty()).then(|| tree.find(moments)),
+            _ => self.matched(held.belief()),
         }
     }
 }
@@ -112,11 +149,7 @@ impl Automaton {
     pub fn conditions(&self) -> String {
         let mut lines = Vec::new();
         if let Some(tree) = &self.tree {
-            let first = match tree.tests.is_empty() {
-                true => Branch::Node(0),
-                false => Branch::Test(0),
-            };
-            self.write_branch(tree, first, 0, &mut lines);
+            self.write_branch(tree, tree.first(), 0, &mut lines);
         }
         lines.join("\n")
     }

@@ -2,7 +2,7 @@
 
 use crate::belief::{Belief, Held, Reading, Tracker, Tracking};
 use crate::model::ActionId;
-use crate::policy::Policy;
+use crate::policy::{Automaton, NodeId, Policy};
 
 /// Something that acts on what it senses.
 pub trait Agent: Send {
@@ -17,6 +17,19 @@ pub trait Agent: Send {
 
     /// The belief it acts on now.
     fn belief(&self) -> &Belief;
+
+    /// The same as it is held, where more is known of it than what a policy reads.
+    fn held(&self) -> Option<&Held> {
+        None
+    }
+
+    /// The node of an automaton at which its belief is; `None` only without nodes.
+    fn node(&self, automaton: &Automaton) -> Option<NodeId> {
+        match self.held() {
+            Some(held) => automaton.matched_in_full(held),
+            None => automaton.matched(self.belief()),
+        }
+    }
 
     /// All that it believes now, with weights that sum to 1.
     fn hypotheses(&self) -> Vec<(f64, &Belief)> {
@@ -38,11 +51,6 @@ impl<'a> TrackingAgent<'a> {
             policy,
         }
     }
-
-    /// What it believes now as it is held, where more is known of it than what a policy reads.
-    pub fn held(&self) -> Option<&Held> {
-        self.tracker.held()
-    }
 }
 
 impl Agent for TrackingAgent<'_> {
@@ -63,5 +71,9 @@ impl Agent for TrackingAgent<'_> {
 
     fn belief(&self) -> &Belief {
         self.tracker.belief()
+    }
+
+    fn held(&self) -> Option<&Held> {
+        self.tracker.held()
     }
 }

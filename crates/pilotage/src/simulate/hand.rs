@@ -1,12 +1,12 @@
 //! An agent that follows a rule of thumb.
 
 use super::Agent;
-use crate::belief::{Belief, BeliefSpace, Reading, Tracker, Tracking};
+use crate::belief::{Belief, BeliefSpace, Held, Reading, Tracker, Tracking};
 use crate::model::ActionId;
 use crate::scenario::HandRule;
 
-/// Follows a rule of thumb on the belief that a tracker keeps. Standard deviations and probabilities of modes are those of the belief's
-/// stratum.
+/// Follows a rule of thumb on the belief that a tracker keeps. Standard deviations and probabilities of modes are those of the belief itself
+/// where it is kept in full, else those of its stratum.
 pub struct HandAgent<'a> {
     tracker: Box<dyn Tracker + 'a>,
     rule: &'a HandRule,
@@ -61,6 +61,18 @@ impl Agent for HandAgent<'_> {
     }
 
     fn act(&mut self) -> ActionId {
+        if let Some(moments) = self.tracker.held().and_then(Held::moments) {
+            let n = moments.mean.len();
+            let deviation = |i: usize| moments.covariance[i * (n + 1)].max(0.0).sqrt();
+            let deviations: Vec<f64> = (0..n).map(deviation).collect();
+            let weights = match moments.weights.len() {
+                1 => &[][..],
+                _ => &moments.weights,
+            };
+            return self
+                .rule
+                .action(&moments.mean, &deviations, weights, self.step);
+        }
         let belief = self.tracker.belief();
         let told = &self.told[belief.stratum];
         let believed;
@@ -83,6 +95,10 @@ impl Agent for HandAgent<'_> {
 
     fn belief(&self) -> &Belief {
         self.tracker.belief()
+    }
+
+    fn held(&self) -> Option<&Held> {
+        self.tracker.held()
     }
 }
 

@@ -29,6 +29,7 @@ pub mod arkaq;
 pub mod bound;
 pub mod codebook;
 pub mod compile;
+mod deviation;
 mod grid;
 pub mod kafaq;
 pub mod kbvi;

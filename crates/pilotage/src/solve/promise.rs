@@ -60,8 +60,9 @@ impl Solution {
             .and_then(|planned| missed(planned, &assumed, &scenario.model));
         if let Some(missed) = missed {
             let reasons = match self.strata() {
-                Some(strata) => vec![format!(
-                    "a belief is read as a mean and one of {strata} strata, and the plan is made for what they have in common; more `strata`, `points` or `rounds` come nearer"
+                Some(strata) => vec![in_full(
+                    strata,
+                    self.planned_value < Some(assumed.discounted.mean),
                 )],
                 None => reasons(&scenario.model),
             };
@@ -141,6 +142,16 @@ fn missed(planned: f64, assumed: &Evaluation, model: &Model) -> Option<String> {
             earned.mean, earned.stderr
         )
     })
+}
+
+/// Why a plan for beliefs in full, which are read as so many strata, earns something else than it says.
+fn in_full(strata: usize, earned_more: bool) -> String {
+    match earned_more {
+        true => "a plan is made for some beliefs, and says too little of those between them; with more `beliefs`, `points` or `rounds` it comes nearer".to_owned(),
+        false => format!(
+            "the plan is finer than what an automaton asks of a belief, or coarser than beliefs are, of which it tells {strata} strata apart; more `--nodes`, `strata`, `points` or `rounds` come nearer"
+        ),
+    }
 }
 
 /// What in a model makes a belief say something else than is so.

@@ -1,6 +1,6 @@
 //! Beliefs a policy meets, sampled from the model.
 
-use crate::belief::{Belief, BeliefSpace, Reading, Updater};
+use crate::belief::{Belief, BeliefSpace, Held, Moments, Reading, Updater};
 use crate::error::Result;
 use crate::model::{ActionId, Model};
 use crate::parallel;
@@ -13,9 +13,9 @@ use crate::world::{Observation, ProblemWorld, Streams, World};
 
 /// One decision: where it was taken, what was done, and what was sensed on the way there.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Decision {
-    /// Belief at which it was taken.
-    pub belief: Belief,
+pub struct Decision<At = Belief> {
+    /// Where it was taken: the belief, as it is read, unless something else was asked for.
+    pub at: At,
     /// Action taken.
     pub action: ActionId,
     /// What was sensed just before (length `m`); empty at the start of an episode, and where the reading was missing.
@@ -51,6 +51,18 @@ pub fn decisions(
     length: usize,
     seed: u64,
 ) -> Vec<Vec<Decision>> {
+    let at = |agent: &dyn Agent| agent.belief().clone();
+    recorded(space, (updater, policy), (episodes, length), seed, &at)
+}
+
+/// The same, with what `at` says of the agent in place of the belief.
+pub(crate) fn recorded<At: Send>(
+    space: &dyn BeliefSpace,
+    (updater, policy): (&Updater, &dyn Policy),
+    (episodes, length): (usize, usize),
+    seed: u64,
+    at: &(dyn Fn(&dyn Agent) -> At + Sync),
+) -> Vec<Vec<Decision<At>>> {
     let length = length.min(MOST_DECISIONS / episodes.max(1));
     let model = space.model();
     let scenario = Scenario::assumed(model);
@@ -60,6 +72,7 @@ pub fn decisions(
         world.reset(&mut Streams::new(seed, episode as u64));
         let mut agent = Recorder {
             inner: TrackingAgent::new(&told[world.hypothesis().min(told.len() - 1)], policy),
+            at,
             sensed: Vec::new(),
             decisions: Vec::new(),
         };
@@ -91,14 +104,18 @@ fn follow(
 pub struct Judged {
     /// The belief, as it is read.
     pub belief: Belief,
-    /// By action: the return expected.
+    /// Its own moments, where it is kept in full.
+    pub moments: Option<Moments>,
+    /// By action: the return expected, or how much less than that of the best action.
     pub values: Vec<f64>,
+    /// The return expected of whoever acts on, where it is known.
+    pub value: Option<f64>,
     /// How often an episode is expected to meet such a belief, discounted.
     pub counts: f64,
 }
 
-/// Runs episodes as [`decisions`] does, of which some decisions are judged: about `most`, and the likelier the more a step counts. Empty
-/// if the judge does not look at beliefs in full. The same for any number of threads.
+/// Runs episodes as [`decisions`] does, of which some decisions are judged: about `most`, and the likelier the more a step counts. A judge
+/// who knows no values holds all actions but its own to be worse by 1. The same for any number of threads.
 pub fn judged(
     space: &dyn BeliefSpace,
     (policy, judge): (&dyn Policy, &dyn Policy),
@@ -108,16 +125,18 @@ pub fn judged(
 ) -> Vec<Judged> {
     let model = space.model();
     let scenario = Scenario::assumed(model);
-    let updater = space.updater();
+    let told = space.updater().told(space);
     let counted: f64 = (0..length)
         .map(|step| model.discount.powi(step as i32))
         .sum();
     let share = most as f64 / (episodes as f64 * counted);
     let runs = parallel::map(episodes, |episode| {
         let mut world = ProblemWorld::new(&scenario);
+        world.reset(&mut Streams::new(seed, episode as u64));
         let mut agent = Judge {
-            inner: TrackingAgent::new(&updater, policy),
+            inner: TrackingAgent::new(&told[world.hypothesis().min(told.len() - 1)], policy),
             judge,
+            actions: model.actions.len(),
             share,
             discount: model.discount,
             counts: 1.0 / episodes as f64,
@@ -134,6 +153,7 @@ pub fn judged(
 struct Judge<'a> {
     inner: TrackingAgent<'a>,
     judge: &'a dyn Policy,
+    actions: usize,
     /// Share of first decisions that is judged.
     share: f64,
     discount: f64,
@@ -141,6 +161,41 @@ struct Judge<'a> {
     counts: f64,
     whims: Rng,
     judged: Vec<Judged>,
+}
+
+impl Judge<'_> {
+    /// The belief of now, judged in full if the judge looks at beliefs in full.
+    fn judged_now(&self, counts: f64) -> Judged {
+        let (belief, held) = (self.inner.belief(), self.inner.held());
+        let in_full = held.and_then(|held| self.judge.values_in_full(held));
+        let (values, value) = match in_full {
+            Some(values) => {
+                let best = values.iter().copied().reduce(f64::max);
+                (values, best)
+            }
+            None => (self.read(belief), self.judge.value(belief)),
+        };
+        Judged {
+            belief: belief.clone(),
+            moments: held.and_then(Held::moments).cloned(),
+            values,
+            value,
+            counts,
+        }
+    }
+
+    /// What is expected of each action at what a belief is read as.
+    fn read(&self, belief: &Belief) -> Vec<f64> {
+        let actions = 0..self.actions;
+        let known = actions
+            .clone()
+            .map(|action| self.judge.action_value(belief, action));
+        known.collect::<Option<Vec<f64>>>().unwrap_or_else(|| {
+            let own = self.judge.action(belief);
+            let value = |action| if action == own { 0.0 } else { -1.0 };
+            actions.map(value).collect()
+        })
+    }
 }
 
 impl Agent for Judge<'_> {
@@ -151,13 +206,8 @@ impl Agent for Judge<'_> {
     fn act(&mut self) -> ActionId {
         let likely = self.share.min(1.0);
         if likely > 0.0 && uniform(&mut self.whims) < likely {
-            let held = self.inner.held();
-            let values = held.and_then(|held| self.judge.values_in_full(held));
-            self.judged.extend(values.map(|values| Judged {
-                belief: self.inner.belief().clone(),
-                values,
-                counts: self.counts / likely,
-            }));
+            let judged = self.judged_now(self.counts / likely);
+            self.judged.push(judged);
         }
         self.share *= self.discount;
         self.counts *= self.discount;
@@ -174,13 +224,14 @@ impl Agent for Judge<'_> {
 }
 
 /// An agent that writes down its decisions.
-struct Recorder<'a> {
+struct Recorder<'a, At> {
     inner: TrackingAgent<'a>,
+    at: &'a (dyn Fn(&dyn Agent) -> At + Sync),
     sensed: Vec<f64>,
-    decisions: Vec<Decision>,
+    decisions: Vec<Decision<At>>,
 }
 
-impl Agent for Recorder<'_> {
+impl<At: Send> Agent for Recorder<'_, At> {
     fn reset(&mut self) {
         self.sensed.clear();
         self.inner.reset();
@@ -190,7 +241,7 @@ impl Agent for Recorder<'_> {
         let action = self.inner.act();
         let observation = std::mem::take(&mut self.sensed);
         self.decisions.push(Decision {
-            belief: self.inner.belief().clone(),
+            at: (self.at)(&self.inner),
             action,
             observation,
         });

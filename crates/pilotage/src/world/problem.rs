@@ -61,6 +61,15 @@ impl ProblemWorld {
         self.hypothesis
     }
 
+    /// Comes to where another world of the same scenario is. What a simulated body keeps for itself is not told: this is for worlds that
+    /// models assume, whose bodies keep nothing.
+    pub(crate) fn resume(&mut self, at: &Self) {
+        self.state.copy_from_slice(&at.state);
+        self.mode = at.mode;
+        self.time = at.time;
+        self.hypothesis = at.hypothesis;
+    }
+
     /// An action, in the mode and phase of now.
     fn doing(&self, action: ActionId) -> Doing {
         Doing {

@@ -14,6 +14,10 @@ const MOST: usize = 100_000;
 /// Where a variable has no bound, cells go so many standard deviations beyond every start.
 const SPREAD: f64 = 5.0;
 
+/// A bound so many times farther from the middle of all that is within reach than the end of that is as good as none: cells out to it would
+/// be coarse where it matters.
+const FAR: f64 = 3.0;
+
 /// Where bounds are no walls, cells go on beyond them for at most this share of their width, for one and for two variables.
 const BEYOND: [f64; 2] = [0.5, 0.25];
 
@@ -21,10 +25,10 @@ const BEYOND: [f64; 2] = [0.5, 0.25];
 const STEPS: f64 = 10.0;
 
 /// The cells of a model: between the bounds of each variable, and beyond them as far as the controls lead in ten steps if they are no
-/// walls to the belief, at most half of their width for one variable and a quarter for two. Where there is no bound they reach from the
-/// starts (5 standard deviations) and the places of which rewards and events speak as far as the controls lead from the starts in ten
-/// steps, three standard deviations of that many steps' noise included. Whole numbers have a cell each, squares of a map whole cells, and
-/// up to a quarter more cells are taken if controls then lead across whole ones.
+/// walls to the belief, at most half of their width for one variable and a quarter for two. Where there is no bound, or one three times
+/// farther out than anything else, they reach from the starts (5 standard deviations) and the places of which rewards and events speak as
+/// far as the controls lead from the starts in ten steps, three standard deviations of that many steps' noise included. Whole numbers have
+/// a cell each, squares of a map whole cells, and up to a quarter more cells are taken if controls then lead across whole ones.
 pub(super) fn grid(model: &Model, dynamics: &Dynamics) -> Result<Grid> {
     let n = model.state_dim();
     let Some(usual) = n.checked_sub(1).and_then(|i| CELLS.get(i)) else {
@@ -73,7 +77,7 @@ fn axis(model: &Model, dynamics: &Dynamics, variable: usize, count: usize) -> Ax
     let width = (high - low) / count as f64;
     let beyond = match kind {
         VariableKind::Angle => [0, 0],
-        _ => beyond(model, dynamics, variable, high - low).map(|by| (by / width).ceil() as usize),
+        _ => beyond(model, dynamics, variable, extent).map(|by| (by / width).ceil() as usize),
     };
     Axis {
         low: low - beyond[0] as f64 * width,
@@ -85,14 +89,15 @@ fn axis(model: &Model, dynamics: &Dynamics, variable: usize, count: usize) -> Ax
 
 /// How far cells go on beyond bounds that are no walls to the belief, on either side. Who goes there is as lost as before; were it the
 /// border, one would know where one is.
-fn beyond(model: &Model, dynamics: &Dynamics, variable: usize, width: f64) -> [f64; 2] {
+fn beyond(model: &Model, dynamics: &Dynamics, variable: usize, extent: Interval) -> [f64; 2] {
     let bounds = model.state[variable].bounds;
-    let most = width * BEYOND[model.state_dim() - 1];
+    let most = extent.width() * BEYOND[model.state_dim() - 1];
     let by = match dynamics.walls() {
         Some(_) => 0.0,
         None => reach(model, dynamics, variable).min(most),
     };
-    [bounds.low, bounds.high].map(|end| if end.is_finite() { by } else { 0.0 })
+    let ends = [(extent.low, bounds.low), (extent.high, bounds.high)];
+    ends.map(|(end, bound)| if end == bound { by } else { 0.0 })
 }
 
 /// The least number of cells, at least `count`, of which a square of the map has a whole number.
@@ -129,9 +134,18 @@ fn whole_steps(
 
 fn extent(model: &Model, dynamics: &Dynamics, variable: usize) -> Interval {
     let bounds = model.state[variable].bounds;
-    if bounds.low.is_finite() && bounds.high.is_finite() {
-        return bounds;
-    }
+    let met = within_reach(model, dynamics, variable);
+    let (middle, half) = (0.5 * (met.low + met.high), 0.5 * met.width());
+    let near = |bound: f64| (bound - middle).abs() <= FAR * half;
+    let end = |bound: f64, else_: f64| if near(bound) { bound } else { else_ };
+    // Starts that are known exactly, and do not move, still need a cell.
+    let low = end(bounds.low, met.low);
+    let high = end(bounds.high, met.high).max(low + 1e-6 * low.abs().max(1.0));
+    Interval::new(low, high)
+}
+
+/// The starts and the places of which rewards and events speak, and as far from there as the controls lead, bounds or not.
+fn within_reach(model: &Model, dynamics: &Dynamics, variable: usize) -> Interval {
     let starts = model.start.iter().flat_map(|start| {
         let reach = SPREAD * start.covariance[(variable, variable)].max(0.0).sqrt();
         [start.mean[variable] - reach, start.mean[variable] + reach]
@@ -145,11 +159,7 @@ fn extent(model: &Model, dynamics: &Dynamics, variable: usize) -> Interval {
         (low.min(place), high.max(place))
     });
     let reach = reach(model, dynamics, variable);
-    let end = |bound: f64, else_: f64| if bound.is_finite() { bound } else { else_ };
-    let low = end(bounds.low, low - reach);
-    // Starts that are known exactly, and do not move, still need a cell.
-    let high = end(bounds.high, high + reach).max(low + 1e-6 * low.abs().max(1.0));
-    Interval::new(low, high)
+    Interval::new(low - reach, high + reach)
 }
 
 /// How far the controls lead along a variable from the starts within reason.

@@ -99,9 +99,9 @@ impl CellsKeeping {
     /// its [`BeliefSettings::cells`](crate::model::BeliefSettings::cells) say, 200 for one and 40 for two if they do not, and up to a
     /// quarter more if controls then lead across whole cells. They lie between the bounds, and beyond them as far as the controls lead in
     /// ten steps if they are no walls to the belief (at most half of their width for one variable and a quarter for two). Where there is
-    /// no bound they reach from the starts (5 standard deviations) and the places of which rewards and events speak as far as the controls
-    /// lead from the starts in ten steps. Whole numbers have a cell each, angles the full circle, and squares of a map a whole number of
-    /// cells.
+    /// no bound, or one three times farther out than anything else, they reach from the starts (5 standard deviations) and the places of
+    /// which rewards and events speak as far as the controls lead from the starts in ten steps. Whole numbers have a cell each, angles the
+    /// full circle, and squares of a map a whole number of cells.
     ///
     /// # Errors
     /// [`Error::Unsupported`] for other models, with the reason and what would do.

@@ -6,26 +6,27 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::belief::BeliefSpace;
 use crate::policy::{Automaton, NodeId, Observed};
+use crate::simulate::Agent;
 use crate::solve::rollout;
 
 /// Runs the automaton in the model and writes predecessors, observations and visits into its nodes.
 pub fn annotate(automaton: &mut Automaton, space: &dyn BeliefSpace, episodes: usize, seed: u64) {
     let model = space.model();
     let m = model.observation_dim();
-    let runs = rollout::decisions(
+    let at = |agent: &dyn Agent| agent.node(automaton);
+    let runs = rollout::recorded(
         space,
-        &automaton.updater,
-        automaton,
-        episodes,
-        model.episode.length,
+        (&automaton.updater, automaton),
+        (episodes, model.episode.length),
         seed,
+        &at,
     );
     let mut sums = vec![Sums::new(m); automaton.nodes.len()];
     let mut steps = 0.0;
     for run in &runs {
         let mut before: Option<NodeId> = None;
         for decision in run {
-            let Some(id) = automaton.matched(&decision.belief) else {
+            let Some(id) = decision.at else {
                 continue;
             };
             steps += 1.0;

@@ -191,11 +191,14 @@ fn meet(
     };
     let mut met: BTreeMap<_, Met> = BTreeMap::new();
     let place = |belief: &Belief| (belief.mode, Reverse(belief.stratum));
-    for Decision { belief, action, .. } in run(policy, settings.episodes) {
+    for Decision {
+        at: belief, action, ..
+    } in run(policy, settings.episodes)
+    {
         let met = met.entry(place(&belief)).or_default();
         met.decisions.push((belief.mean, action));
     }
-    for Decision { belief, .. } in run(&disturbed, settings.episodes.div_ceil(4)) {
+    for Decision { at: belief, .. } in run(&disturbed, settings.episodes.div_ceil(4)) {
         met.entry(place(&belief))
             .or_default()
             .beside

@@ -182,7 +182,7 @@ impl GridPolicy {
         let beyond = |i: usize| {
             let outside = met
                 .iter()
-                .filter(|decision| beyond(&axes[i], decision.belief.mean[i]));
+                .filter(|decision| beyond(&axes[i], decision.at.mean[i]));
             (outside.count() as f64 / met.len() as f64, i)
         };
         let (share, i) = (0..axes.len())

@@ -1,0 +1,129 @@
+//! Beliefs with what every action costs there: what trees are grown on.
+
+use crate::belief::{Belief, BeliefSpace};
+use crate::policy::{Asked, Automaton, Feature, StratumFeatures};
+use crate::solve::rollout::Judged;
+
+/// Beliefs with what actions cost there.
+pub(super) struct Collected {
+    /// What is known of each belief.
+    pub(super) features: Vec<Feature>,
+    pub(super) actions: usize,
+    pub(super) beliefs: Vec<Belief>,
+    /// By feature and belief.
+    pub(super) columns: Vec<Vec<f64>>,
+    /// By belief and action: what is lost by the action, times how much the belief counts.
+    pub(super) costs: Vec<f64>,
+    /// How much each belief counts: its discount, divided by the number of episodes.
+    pub(super) counts: Vec<f64>,
+    /// What is expected from each belief, where it is known.
+    pub(super) values: Vec<Option<f64>>,
+    strata: Vec<StratumFeatures>,
+}
+
+/// Beliefs of a set that share a leaf or a test, in the order of each feature.
+pub(super) type Members = Vec<Vec<u32>>;
+
+impl Collected {
+    pub(super) fn new(space: &dyn BeliefSpace, automaton: &Automaton) -> Self {
+        let features = features(space, automaton);
+        Self {
+            columns: vec![Vec::new(); features.len()],
+            features,
+            actions: space.model().actions.len(),
+            beliefs: Vec::new(),
+            costs: Vec::new(),
+            counts: Vec::new(),
+            values: Vec::new(),
+            strata: (0..space.strata())
+                .map(|stratum| StratumFeatures::of(automaton, stratum))
+                .collect(),
+        }
+    }
+
+    /// Adds beliefs that were judged.
+    pub(super) fn extend(&mut self, judged: impl IntoIterator<Item = Judged>) {
+        for judged in judged {
+            let stratum = &self.strata[judged.belief.stratum];
+            for (feature, column) in self.features.iter().zip(&mut self.columns) {
+                column.push(match &judged.moments {
+                    Some(moments) => moments.feature(*feature),
+                    None => (stratum, &judged.belief).feature(*feature),
+                });
+            }
+            let best = judged
+                .values
+                .iter()
+                .copied()
+                .fold(f64::NEG_INFINITY, f64::max);
+            let costs = judged
+                .values
+                .iter()
+                .map(|value| judged.counts * (best - value));
+            self.costs.extend(costs);
+            self.beliefs.push(judged.belief);
+            self.counts.push(judged.counts);
+            self.values.push(judged.value);
+        }
+    }
+
+    /// All beliefs.
+    pub(super) fn all(&self) -> Members {
+        let order = |column: &Vec<f64>| {
+            let mut order: Vec<u32> = (0..column.len() as u32).collect();
+            let value = |member: u32| column[member as usize];
+            order.sort_by(|&a, &b| value(a).total_cmp(&value(b)).then(a.cmp(&b)));
+            order
+        };
+        self.columns.iter().map(order).collect()
+    }
+
+    /// What the actions cost at a belief.
+    pub(super) fn costs_of(&self, member: u32) -> &[f64] {
+        &self.costs[member as usize * self.actions..][..self.actions]
+    }
+
+    /// What each action costs at all members together.
+    pub(super) fn sums(&self, members: &[u32]) -> Vec<f64> {
+        let mut sums = vec![0.0; self.actions];
+        for member in members {
+            for (sum, cost) in sums.iter_mut().zip(self.costs_of(*member)) {
+                *sum += cost;
+            }
+        }
+        sums
+    }
+
+    /// How much members count.
+    pub(super) fn counted(&self, members: &[u32]) -> f64 {
+        let counts = members.iter().map(|member| self.counts[*member as usize]);
+        counts.sum()
+    }
+
+    /// Members on either side of a test, in the same orders.
+    pub(super) fn parted(&self, members: Members, feature: usize, less_than: f64) -> [Members; 2] {
+        let column = &self.columns[feature];
+        let below = |member: &u32| column[*member as usize] < less_than;
+        let parted = members
+            .into_iter()
+            .map(|order| order.into_iter().partition(below));
+        let (yes, no) = parted.unzip();
+        [yes, no]
+    }
+}
+
+/// What the tree may ask: means, deviations where they differ, modes where there are several.
+fn features(space: &dyn BeliefSpace, automaton: &Automaton) -> Vec<Feature> {
+    let n = space.model().state_dim();
+    let means = (0..n).map(Feature::Mean);
+    let deviations = (0..n).map(Feature::Deviation);
+    let modes = match automaton.modes.len() {
+        0 | 1 => 0..0,
+        2 => 1..2,
+        modes => 0..modes,
+    };
+    means
+        .chain(deviations)
+        .chain(modes.map(Feature::Mode))
+        .collect()
+}

@@ -1,0 +1,328 @@
+//! From a policy with values to a small decision tree.
+//!
+//! 1. **Imitate.** Beliefs are collected by acting, each with what the policy expects of every action. The tree grows where a wrong action costs
+//!    most. Then the tree itself is run, and the beliefs *it* meets, which are others than those of the policy, are added: what is imitated
+//!    has to be right where the imitator goes (S. Ross, G. Gordon and D. Bagnell, 2011; with costs for weights, O. Bastani, Y. Pu and
+//!    A. Solar-Lezama, 2018).
+//! 2. **Improve.** The policy sees more of a belief than a tree can ask, so what it expects is not what the tree will earn. The tree is run again,
+//!    and from the beliefs it meets each action is tried once before the tree goes on ([`deviation`]). The next tree is grown on what that
+//!    earned, summed over all rounds (Y. Abbasi-Yadkori and others, "POLITEX", 2019).
+//! 3. **Choose.** Trees of many sizes are run in the same episodes, and the smallest is taken that earns hardly less than the best.
+
+mod collected;
+mod growth;
+mod shape;
+#[cfg(test)]
+mod tests;
+
+use crate::belief::BeliefSpace;
+use crate::policy::{
+    Automaton, AutomatonRunner, Branch, Matching, Node, Place, Policy, Test, Tree,
+};
+use crate::solve::deviation::{self, Budget};
+use crate::solve::rollout;
+use collected::Collected;
+use growth::Growth;
+use shape::{Shape, Spot};
+
+/// How small a tree has to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Size {
+    /// Most nodes, at least 1.
+    pub nodes: usize,
+    /// Return that may be lost, as a share of that of the best tree.
+    pub loss: f64,
+}
+
+/// Rounds in which the policy is imitated.
+const IMITATING: usize = 3;
+
+/// Rounds in which the tree is improved on what it earns.
+const IMPROVING: usize = 3;
+
+/// Beliefs judged in a round of imitation for each episode, where the policy reads them, and where it is asked in full, which takes far
+/// longer.
+const READ: f64 = 20.0;
+const IN_FULL: f64 = 1.5;
+
+/// Beliefs in a round of improvement, and steps, for each episode.
+const DEVIATIONS: f64 = 10.0;
+const STEPS: f64 = 125.0;
+
+/// Steps for each episode by which a tree is compared.
+const TRIAL_STEPS: f64 = 12.5;
+
+/// Trees that may be no better than those before, one after the other, until no larger one is tried.
+const PATIENCE: usize = 4;
+
+/// Trees of up to so many nodes are tried in any case: where it takes many questions to earn anything, a few are as bad as none.
+const FEW: usize = 19;
+
+/// A limit beyond which it need not be tried itself.
+const LARGE: usize = 500;
+
+/// Grows a tree for a policy, and gives it to the automaton as its nodes.
+pub(super) fn grow(
+    automaton: &mut Automaton,
+    policy: &dyn Policy,
+    space: &dyn BeliefSpace,
+    size: Size,
+    (episodes, seed): (usize, u64),
+) {
+    automaton.matching = Matching::Tree;
+    let search = Search {
+        policy,
+        space,
+        size,
+        episodes,
+        seed,
+        bare: automaton.clone(),
+    };
+    let mut tried = search.imitate();
+    search.improve(&mut tried);
+    if let Some(chosen) = search.chosen(tried) {
+        *automaton = chosen;
+    }
+}
+
+struct Search<'a> {
+    policy: &'a dyn Policy,
+    space: &'a dyn BeliefSpace,
+    size: Size,
+    episodes: usize,
+    seed: u64,
+    /// The automaton, which has no nodes yet.
+    bare: Automaton,
+}
+
+/// A tree with what it earns.
+struct Tried {
+    earned: f64,
+    tree: Automaton,
+}
+
+impl Search<'_> {
+    fn times(&self, each: f64) -> usize {
+        (each * self.episodes as f64).ceil() as usize
+    }
+
+    /// Trees grown on what the policy expects at the beliefs that they meet.
+    fn imitate(&self) -> Vec<Tried> {
+        let length = self.space.model().episode.length;
+        let start = self.bare.updater.start();
+        let most = self.times(match self.policy.values_in_full(&start) {
+            Some(_) => IN_FULL,
+            None => READ,
+        });
+        let mut collected = Collected::new(self.space, &self.bare);
+        let mut tree: Option<Automaton> = None;
+        for round in 0..IMITATING {
+            let runner = tree.as_ref().map(AutomatonRunner::new);
+            let imitator = runner.as_ref().map_or(self.policy, |runner| runner);
+            let runs = (self.episodes, length);
+            let seed = self.seed.wrapping_add(round as u64);
+            collected.extend(rollout::judged(
+                self.space,
+                (imitator, self.policy),
+                runs,
+                most,
+                seed,
+            ));
+            tree = Some(self.of_size(&collected, &mut Growth::new(&collected), self.imitated()));
+        }
+        self.of_sizes(&collected)
+    }
+
+    /// Nodes of a tree that collects beliefs for the next.
+    fn imitated(&self) -> usize {
+        const ENOUGH: usize = 40;
+        self.size.nodes.min(ENOUGH)
+    }
+
+    /// Trees grown on what the best so far earns if it once does something else.
+    fn improve(&self, tried: &mut Vec<Tried>) {
+        let budget = Budget {
+            deviations: self.times(DEVIATIONS),
+            steps: self.times(STEPS),
+        };
+        let mut collected = Collected::new(self.space, &self.bare);
+        for round in 0..IMPROVING {
+            let Some(best) = best(tried) else { return };
+            let runner = AutomatonRunner::new(&best.tree);
+            let seed = self.seed.wrapping_add((IMITATING + round) as u64);
+            collected.extend(deviation::deviations(self.space, &runner, budget, seed));
+            tried.extend(self.of_sizes(&collected));
+        }
+    }
+
+    /// The smallest tree that earns hardly less than the best.
+    fn chosen(&self, mut tried: Vec<Tried>) -> Option<Automaton> {
+        let best = best(&tried)?.earned;
+        let enough = best - self.size.loss * best.abs();
+        let nodes = |tried: &Tried| tried.tree.nodes.len();
+        tried.retain(|tried| tried.earned >= enough);
+        let least = tried.iter().map(nodes).min()?;
+        tried.retain(|tried| nodes(tried) == least);
+        tried.sort_by(|a, b| b.earned.total_cmp(&a.earned));
+        tried.into_iter().next().map(|tried| tried.tree)
+    }
+
+    /// Trees of many sizes, as far as larger ones earn more.
+    fn of_sizes(&self, collected: &Collected) -> Vec<Tried> {
+        let mut growth = Growth::new(collected);
+        let mut tried: Vec<Tried> = Vec::new();
+        let mut most = f64::NEG_INFINITY;
+        let mut since = 0;
+        for nodes in sizes(self.size.nodes) {
+            let tree = self.of_size(collected, &mut growth, nodes);
+            if tried.iter().any(|known| known.tree.tree == tree.tree) {
+                since += 1;
+            } else {
+                let earned = self.earned(&tree);
+                since = match earned > most + 0.1 * self.size.loss * most.abs() {
+                    true => 0,
+                    false => since + 1,
+                };
+                most = most.max(earned);
+                tried.push(Tried { earned, tree });
+            }
+            if since >= PATIENCE && nodes >= FEW {
+                break;
+            }
+        }
+        tried
+    }
+
+    /// What a tree earns where the model holds, in the same episodes as every other.
+    fn earned(&self, tree: &Automaton) -> f64 {
+        let seed = self.seed.wrapping_add((IMITATING + IMPROVING) as u64);
+        let runner = AutomatonRunner::new(tree);
+        deviation::expected(self.space, &runner, self.times(TRIAL_STEPS), seed).mean
+    }
+
+    /// A tree of at most so many nodes: grown larger, made better, and cut back.
+    fn of_size(&self, collected: &Collected, growth: &mut Growth<'_>, nodes: usize) -> Automaton {
+        let all = collected.all();
+        let mut shape = growth.to(larger(nodes)).clone();
+        shape.refine(collected, &all);
+        shape.cut_back(collected, &all, nodes);
+        let mut tree = self.bare.clone();
+        write(&shape, collected, &mut tree);
+        tree
+    }
+}
+
+fn best(tried: &[Tried]) -> Option<&Tried> {
+    let better = |a: &&Tried, b: &&Tried| a.earned.total_cmp(&b.earned);
+    tried.iter().max_by(better)
+}
+
+/// Leaves to which a tree is grown before it is cut back to so many.
+fn larger(nodes: usize) -> usize {
+    nodes + (nodes / 2 + 4).min(16)
+}
+
+/// Numbers of nodes that are tried: each about half more than the one before, up to the most.
+fn sizes(most: usize) -> Vec<usize> {
+    let mut sizes = vec![1];
+    while let Some(&last) = sizes.last() {
+        let next = (last + 1).max(last * 3 / 2);
+        if next > most {
+            break;
+        }
+        sizes.push(next);
+    }
+    if sizes.last() != Some(&most) && most < LARGE {
+        sizes.push(most);
+    }
+    sizes
+}
+
+/// Gives tests and nodes to an automaton, in the order of a walk through the tree.
+fn write(shape: &Shape, collected: &Collected, automaton: &mut Automaton) {
+    let members = shape.members(collected);
+    let mut tree = Tree::default();
+    automaton.nodes.clear();
+    walk(shape, 0, &mut tree, collected, &mut |spot, action| {
+        automaton
+            .nodes
+            .push(node(&members[spot], action, collected));
+        automaton.nodes.len() - 1
+    });
+    automaton.tree = Some(tree);
+}
+
+fn walk(
+    shape: &Shape,
+    spot: usize,
+    tree: &mut Tree,
+    collected: &Collected,
+    add: &mut dyn FnMut(usize, usize) -> usize,
+) -> Branch {
+    match shape.spots[spot] {
+        Spot::Leaf(action) => Branch::Node(add(spot, action)),
+        Spot::Test(cut, ends) => {
+            let number = tree.tests.len();
+            tree.tests.push(Test {
+                feature: collected.features[cut.feature],
+                less_than: cut.less_than,
+                yes: Branch::Node(0),
+                no: Branch::Node(0),
+            });
+            let [yes, no] = ends.map(|end| walk(shape, end, tree, collected, add));
+            tree.tests[number].yes = yes;
+            tree.tests[number].no = no;
+            Branch::Test(number)
+        }
+    }
+}
+
+/// The node of a leaf: where the beliefs that were met in it lie.
+fn node(members: &[u32], action: usize, collected: &Collected) -> Node {
+    let met = || {
+        let members = members.iter().map(|member| *member as usize);
+        members.map(|member| (&collected.beliefs[member], collected.values[member]))
+    };
+    let n = collected
+        .beliefs
+        .first()
+        .map_or(0, |belief| belief.mean.len());
+    let (mut lower, mut upper) = (vec![f64::INFINITY; n], vec![f64::NEG_INFINITY; n]);
+    let mut middle = vec![0.0; n];
+    let (mut first, mut last) = (usize::MAX, 0);
+    let mut modes: Vec<usize> = Vec::new();
+    let mut value = 0.0;
+    let mut known = true;
+    let count = members.len().max(1) as f64;
+    for (belief, worth) in met() {
+        for i in 0..n {
+            lower[i] = lower[i].min(belief.mean[i]);
+            upper[i] = upper[i].max(belief.mean[i]);
+            middle[i] += belief.mean[i] / count;
+        }
+        (first, last) = (first.min(belief.stratum), last.max(belief.stratum));
+        modes.resize(modes.len().max(belief.mode + 1), 0);
+        modes[belief.mode] += 1;
+        match worth {
+            Some(worth) => value += worth / count,
+            None => known = false,
+        }
+    }
+    for i in 0..n {
+        middle[i] = middle[i].clamp(lower[i], upper[i]);
+    }
+    let mode = (0..modes.len()).max_by_key(|&mode| (modes[mode], std::cmp::Reverse(mode)));
+    let place = Place::Segment {
+        lower,
+        minimum: middle,
+        upper,
+    };
+    let levels = first.min(last)..=last;
+    Node::new(
+        levels,
+        mode.unwrap_or(0),
+        place,
+        action,
+        known.then_some(value),
+    )
+}

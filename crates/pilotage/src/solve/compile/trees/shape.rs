@@ -1,0 +1,235 @@
+//! The shape of a tree: tests and leaves, which are made better in turn, and cut back.
+//!
+//! With all other tests as they are, what each belief costs on either side of a test is known, and the best place for the test is found by
+//! going along each feature once (tree alternating optimisation: M. Carreira-Perpiñán and P. Tavallali, 2018).
+
+use super::collected::{Collected, Members};
+use super::growth::{Cut, LEAST};
+use crate::model::ActionId;
+use crate::parallel;
+
+/// Times that all tests are gone through, at most.
+const PASSES: usize = 8;
+
+/// A pass that saves less than this share of the cost is the last one.
+const LITTLE: f64 = 1e-4;
+
+/// A place in a tree.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Spot {
+    /// What to do.
+    Leaf(ActionId),
+    /// Where to go on: at the first if the feature is less, else at the second.
+    Test(Cut, [usize; 2]),
+}
+
+/// A tree. It begins at the first spot; spots to which nothing leads any more may be left over.
+#[derive(Debug, Clone)]
+pub(super) struct Shape {
+    pub(super) spots: Vec<Spot>,
+}
+
+impl Shape {
+    pub(super) fn leaf(action: ActionId) -> Self {
+        Self {
+            spots: vec![Spot::Leaf(action)],
+        }
+    }
+
+    /// Makes a leaf a test with two leaves, and says where they are.
+    pub(super) fn split(&mut self, spot: usize, cut: Cut, actions: [ActionId; 2]) -> [usize; 2] {
+        let ends = [self.spots.len(), self.spots.len() + 1];
+        self.spots.extend(actions.map(Spot::Leaf));
+        self.spots[spot] = Spot::Test(cut, ends);
+        ends
+    }
+
+    /// Leaves below a spot.
+    pub(super) fn leaves(&self, spot: usize) -> usize {
+        match self.spots[spot] {
+            Spot::Leaf(_) => 1,
+            Spot::Test(_, ends) => ends.iter().map(|end| self.leaves(*end)).sum(),
+        }
+    }
+
+    /// The action for a belief that comes to a spot.
+    fn action(&self, collected: &Collected, mut spot: usize, member: u32) -> ActionId {
+        loop {
+            match self.spots[spot] {
+                Spot::Leaf(action) => return action,
+                Spot::Test(cut, ends) => {
+                    let value = collected.columns[cut.feature][member as usize];
+                    spot = ends[usize::from(value >= cut.less_than)];
+                }
+            }
+        }
+    }
+
+    /// What a belief costs that comes to a spot.
+    fn cost_of(&self, collected: &Collected, spot: usize, member: u32) -> f64 {
+        collected.costs_of(member)[self.action(collected, spot, member)]
+    }
+
+    /// What all beliefs cost.
+    pub(super) fn cost(&self, collected: &Collected) -> f64 {
+        let members = 0..collected.beliefs.len() as u32;
+        members
+            .map(|member| self.cost_of(collected, 0, member))
+            .sum()
+    }
+
+    /// Puts tests and actions where they cost least, one after the other, until little is saved.
+    pub(super) fn refine(&mut self, collected: &Collected, all: &Members) {
+        let least = LEAST * collected.counted(&all[0]);
+        let mut cost = self.cost(collected);
+        for _ in 0..PASSES {
+            self.refine_below(collected, 0, all.clone(), least);
+            let now = self.cost(collected);
+            if cost - now <= LITTLE * cost {
+                break;
+            }
+            cost = now;
+        }
+    }
+
+    fn refine_below(&mut self, collected: &Collected, spot: usize, members: Members, least: f64) {
+        if members[0].is_empty() {
+            return;
+        }
+        match self.spots[spot] {
+            Spot::Leaf(_) => {
+                self.spots[spot] = Spot::Leaf(cheapest(&collected.sums(&members[0])));
+            }
+            Spot::Test(cut, ends) => {
+                let cut = self.moved(collected, (cut, ends), &members, least);
+                self.spots[spot] = Spot::Test(cut, ends);
+                let parts = collected.parted(members, cut.feature, cut.less_than);
+                for (end, members) in ends.into_iter().zip(parts) {
+                    self.refine_below(collected, end, members, least);
+                }
+            }
+        }
+    }
+
+    /// The best test with what lies below it as it is: the old one, unless another saves something.
+    fn moved(
+        &self,
+        collected: &Collected,
+        (cut, ends): (Cut, [usize; 2]),
+        members: &Members,
+        least: f64,
+    ) -> Cut {
+        let mut worse = vec![0.0; collected.beliefs.len()];
+        for member in &members[0] {
+            let [yes, no] = ends.map(|end| self.cost_of(collected, end, *member));
+            worse[*member as usize] = yes - no;
+        }
+        let below =
+            |member: &&u32| collected.columns[cut.feature][**member as usize] < cut.less_than;
+        let now: f64 = members[0]
+            .iter()
+            .filter(below)
+            .map(|member| worse[*member as usize])
+            .sum();
+        let counted = collected.counted(&members[0]);
+        let along = parallel::map(members.len(), |feature| {
+            let column = &collected.columns[feature];
+            let (mut sum, mut count) = (0.0, 0.0);
+            let mut best: Option<(f64, f64)> = None;
+            for pair in members[feature].windows(2) {
+                sum += worse[pair[0] as usize];
+                count += collected.counts[pair[0] as usize];
+                let (here, next) = (column[pair[0] as usize], column[pair[1] as usize]);
+                if here >= next || count < least || counted - count < least {
+                    continue;
+                }
+                if best.is_none_or(|(known, _)| sum < known) {
+                    best = Some((sum, 0.5 * (here + next)));
+                }
+            }
+            best
+        });
+        let all: f64 = members[0]
+            .iter()
+            .map(|member| worse[*member as usize].abs())
+            .sum();
+        let mut best = (now - 1e-9 * all, cut);
+        for (feature, found) in along.into_iter().enumerate() {
+            if let Some((sum, less_than)) = found.filter(|(sum, _)| *sum < best.0) {
+                best = (sum, Cut { feature, less_than });
+            }
+        }
+        best.1
+    }
+
+    /// Takes away tests, each time the one of which a leaf less costs least, until no more leaves than so many are left, and those that
+    /// save nothing.
+    pub(super) fn cut_back(&mut self, collected: &Collected, all: &Members, leaves: usize) {
+        loop {
+            let now = self.leaves(0);
+            let mut best: Option<(f64, usize, usize)> = None;
+            self.weigh(collected, 0, &all[0], &mut |ratio, spot, end| {
+                if best.is_none_or(|(least, _, _)| ratio < least) {
+                    best = Some((ratio, spot, end));
+                }
+            });
+            let Some((ratio, spot, end)) = best else {
+                return;
+            };
+            if now <= leaves && ratio > 0.0 {
+                return;
+            }
+            self.spots[spot] = self.spots[end];
+            self.refine(collected, all);
+        }
+    }
+
+    /// Tells of every test what each leaf less would cost if all went on at one of its ends.
+    fn weigh(
+        &self,
+        collected: &Collected,
+        spot: usize,
+        members: &[u32],
+        tell: &mut dyn FnMut(f64, usize, usize),
+    ) {
+        let Spot::Test(cut, ends) = self.spots[spot] else {
+            return;
+        };
+        let column = &collected.columns[cut.feature];
+        let (yes, no): (Vec<u32>, Vec<u32>) = members
+            .iter()
+            .partition(|member| column[**member as usize] < cut.less_than);
+        for (gone, kept, stray) in [(ends[1], ends[0], &no), (ends[0], ends[1], &yes)] {
+            let more = |member: &u32| {
+                self.cost_of(collected, kept, *member) - self.cost_of(collected, gone, *member)
+            };
+            let more: f64 = stray.iter().map(more).sum();
+            tell(more / self.leaves(gone) as f64, spot, kept);
+        }
+        self.weigh(collected, ends[0], &yes, tell);
+        self.weigh(collected, ends[1], &no, tell);
+    }
+
+    /// Beliefs at each leaf, by spot.
+    pub(super) fn members(&self, collected: &Collected) -> Vec<Vec<u32>> {
+        let mut members = vec![Vec::new(); self.spots.len()];
+        for member in 0..collected.beliefs.len() as u32 {
+            let mut spot = 0;
+            while let Spot::Test(cut, ends) = self.spots[spot] {
+                let value = collected.columns[cut.feature][member as usize];
+                spot = ends[usize::from(value >= cut.less_than)];
+            }
+            members[spot].push(member);
+        }
+        members
+    }
+}
+
+/// The first of the least.
+pub(super) fn cheapest(sums: &[f64]) -> ActionId {
+    let cheaper = |best: usize, action: usize| match sums[action] < sums[best] {
+        true => action,
+        false => best,
+    };
+    (0..sums.len()).fold(0, cheaper)
+}

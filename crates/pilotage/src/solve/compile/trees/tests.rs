@@ -1,0 +1,97 @@
+//! Growing, refining and cutting back, on beliefs whose costs are known.
+
+use proptest::prelude::*;
+
+use super::collected::Collected;
+use super::growth::Growth;
+use super::shape::{Shape, Spot};
+use crate::belief::{Belief, BeliefMdp};
+use crate::policy::{Automaton, Matching};
+use crate::scenario::find;
+use crate::solve::rollout::Judged;
+
+/// Beliefs of a plane, with what is expected of two actions.
+fn collected(beliefs: impl IntoIterator<Item = ([f64; 2], [f64; 2])>) -> Collected {
+    let scenario = find("maze-2d-unbounded").unwrap();
+    let mdp = BeliefMdp::new(&scenario.model);
+    let automaton = Automaton::new(&mdp, "test", Matching::Tree);
+    let mut collected = Collected::new(&mdp, &automaton);
+    collected.actions = 2;
+    collected.extend(beliefs.into_iter().map(|(mean, values)| Judged {
+        belief: Belief {
+            stratum: 0,
+            mode: 0,
+            mean: mean.to_vec(),
+        },
+        moments: None,
+        values: values.to_vec(),
+        value: None,
+        counts: 1.0,
+    }));
+    collected
+}
+
+/// Evenly spread, and what is best there by a rule.
+fn ruled(first: impl Fn(f64, f64) -> bool) -> Collected {
+    let side = || (0..40).map(|k| -1.0 + (f64::from(k) + 0.5) / 20.0);
+    let at = side().flat_map(|x| side().map(move |y| [x, y]));
+    let values = |[x, y]: [f64; 2]| if first(x, y) { [1.0, 0.0] } else { [0.0, 1.0] };
+    collected(at.map(|at| (at, values(at))))
+}
+
+#[test]
+fn two_questions_are_found_of_which_neither_helps_alone() {
+    let collected = ruled(|x, y| (x < 0.2) != (y < -0.3));
+    let mut shape = Growth::new(&collected).to(4).clone();
+    shape.refine(&collected, &collected.all());
+    assert_eq!(shape.cost(&collected), 0.0);
+    assert_eq!(shape.leaves(0), 4);
+}
+
+#[test]
+fn a_rule_is_found_to_its_borders_and_cut_back_to_as_many_leaves_as_it_has() {
+    let collected = ruled(|x, y| x < 0.4 && y < 0.7 && y > -0.5);
+    let mut shape = Growth::new(&collected).to(12).clone();
+    shape.refine(&collected, &collected.all());
+    shape.cut_back(&collected, &collected.all(), 12);
+    assert_eq!((shape.cost(&collected), shape.leaves(0)), (0.0, 4));
+    let mut borders: Vec<i32> = shape
+        .spots
+        .iter()
+        .filter_map(|spot| match spot {
+            Spot::Test(cut, _) => Some((10.0 * cut.less_than).round() as i32),
+            Spot::Leaf(_) => None,
+        })
+        .collect();
+    borders.sort_unstable();
+    borders.dedup();
+    assert_eq!(borders, [-5, 4, 7]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// Whatever things cost, refining never makes a tree worse, no size is exceeded, and every belief is at one leaf.
+    #[test]
+    fn refining_never_costs_and_cutting_back_keeps_to_the_size(
+        beliefs in prop::collection::vec(
+            ((-1.0f64..1.0, -1.0f64..1.0), (0.0f64..1.0, 0.0f64..1.0)), 1..120),
+        leaves in 1usize..9,
+    ) {
+        let beliefs = beliefs.into_iter().map(|((x, y), (a, b))| ([x, y], [a, b]));
+        let collected = collected(beliefs);
+        let all = collected.all();
+        let mut growth = Growth::new(&collected);
+        let alone = growth.to(1).cost(&collected);
+        let mut shape: Shape = growth.to(leaves + 6).clone();
+        prop_assert!(shape.leaves(0) <= leaves + 6);
+        let grown = shape.cost(&collected);
+        shape.refine(&collected, &all);
+        prop_assert!(shape.cost(&collected) <= grown + 1e-9);
+        shape.cut_back(&collected, &all, leaves);
+        prop_assert!(shape.leaves(0) <= leaves);
+        prop_assert!(shape.cost(&collected) <= alone + 1e-9);
+        let members: usize = shape.members(&collected).iter().map(Vec::len).sum();
+        prop_assert_eq!(members, collected.beliefs.len());
+    }
+}

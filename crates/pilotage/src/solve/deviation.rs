@@ -1,0 +1,314 @@
+//! What a policy earns, and what it would earn if it once did something else, found by running it.
+//!
+//! Episodes of the world that a model assumes are run under the policy. Where a belief is kept in full, returns are sums of what it expects
+//! to be paid rather than of what is paid: the same on average, and less by chance (Rao-Blackwell).
+
+use crate::belief::{BeliefSpace, Held, Updater, is_kept};
+use crate::model::{ActionId, Model, Then};
+use crate::parallel;
+use crate::policy::Policy;
+use crate::random::{Role, stream, uniform};
+use crate::scenario::Scenario;
+use crate::simulate::Estimate;
+use crate::solve::rollout::Judged;
+use crate::world::{Observation, ProblemWorld, Streams, World};
+
+/// How much may be run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Budget {
+    /// Beliefs from which every action is tried.
+    pub deviations: usize,
+    /// Steps in all.
+    pub steps: usize,
+}
+
+/// Episodes that are run together before the budget is looked at.
+const TOGETHER: usize = 32;
+
+/// Episodes that are run however long they are.
+const FEWEST: usize = 40;
+
+/// Beliefs of an episode that is never over early from which every action is tried, on average.
+const EACH: f64 = 1.5;
+
+/// A return is not followed further once what is left counts for so little.
+const LITTLE: f64 = 1e-3;
+
+/// Beliefs that a policy meets, the likelier chosen the more a step counts, with what it earns from there if it begins with each action.
+/// The same for any number of threads.
+pub(crate) fn deviations(
+    space: &dyn BeliefSpace,
+    policy: &dyn Policy,
+    budget: Budget,
+    seed: u64,
+) -> Vec<Judged> {
+    let runs = Runs::new(space, policy);
+    let mut all: Vec<Judged> = Vec::new();
+    let (mut episodes, mut steps) = (0, 0);
+    while episodes < FEWEST || (all.len() < budget.deviations && steps < budget.steps) {
+        let together = parallel::map(TOGETHER, |i| runs.deviating(seed, (episodes + i) as u64));
+        for (judged, taken) in together {
+            all.extend(judged);
+            steps += taken;
+        }
+        episodes += TOGETHER;
+    }
+    for judged in &mut all {
+        judged.counts /= episodes as f64;
+    }
+    all
+}
+
+/// What a policy earns, by at least so many steps of episodes. The same for any number of threads.
+pub(crate) fn expected(
+    space: &dyn BeliefSpace,
+    policy: &dyn Policy,
+    steps: usize,
+    seed: u64,
+) -> Estimate {
+    let runs = Runs::new(space, policy);
+    let mut returns: Vec<f64> = Vec::new();
+    let mut taken = 0;
+    while returns.len() < FEWEST || taken < steps {
+        let first = returns.len();
+        let together = parallel::map(TOGETHER, |i| runs.plain(seed, (first + i) as u64));
+        for (earned, steps) in together {
+            returns.push(earned);
+            taken += steps;
+        }
+    }
+    Estimate::of(returns.iter().copied())
+}
+
+/// Episodes of a policy.
+struct Runs<'a> {
+    model: &'a Model,
+    scenario: Scenario,
+    /// By start hypothesis.
+    told: Vec<Updater>,
+    policy: &'a dyn Policy,
+}
+
+/// An episode as it goes on.
+struct Course<'a> {
+    runs: &'a Runs<'a>,
+    world: ProblemWorld,
+    updater: &'a Updater,
+    held: Held,
+    observation: Observation,
+    /// Steps taken.
+    step: usize,
+}
+
+/// What a step pays, and whether the episode goes on.
+struct Paid {
+    reward: f64,
+    goes_on: bool,
+}
+
+impl<'a> Runs<'a> {
+    fn new(space: &'a dyn BeliefSpace, policy: &'a dyn Policy) -> Self {
+        let model = space.model();
+        Self {
+            model,
+            scenario: Scenario::assumed(model),
+            told: space.updater().told(space),
+            policy,
+        }
+    }
+
+    fn start(&'a self, draws: &mut Streams) -> Course<'a> {
+        let mut world = ProblemWorld::new(&self.scenario);
+        world.reset(draws);
+        let updater = &self.told[world.hypothesis().min(self.told.len() - 1)];
+        Course {
+            runs: self,
+            world,
+            held: updater.start(),
+            updater,
+            observation: Observation::new(self.model.observation_dim()),
+            step: 0,
+        }
+    }
+
+    fn plain(&'a self, seed: u64, episode: u64) -> (f64, usize) {
+        let mut draws = Streams::new(seed, episode);
+        let mut course = self.start(&mut draws);
+        let earned = course.followed(None, 0.0, &mut draws);
+        (earned, course.step)
+    }
+
+    /// The beliefs chosen of an episode, and the steps that it took in all. Beliefs count by their discount.
+    fn deviating(&'a self, seed: u64, episode: u64) -> (Vec<Judged>, usize) {
+        let discount = self.model.discount;
+        let counted: f64 = (0..self.model.episode.length)
+            .map(|step| discount.powi(step as i32))
+            .sum();
+        let mut whims = stream(seed, episode, Role::Exploration);
+        let mut draws = Streams::new(seed, episode);
+        let mut course = self.start(&mut draws);
+        let mut branch = self.start(&mut Streams::new(seed, episode));
+        let (mut judged, mut steps) = (Vec::new(), 0);
+        let mut counts = 1.0;
+        while course.step < self.model.episode.length {
+            let likely = (EACH / counted * counts).min(1.0);
+            let own = self.policy.action_in_full(&course.held);
+            if uniform(&mut whims) < likely {
+                // The same draws for every action, and others than those of the episode itself.
+                let number = episode
+                    .wrapping_mul(self.model.episode.length as u64)
+                    .wrapping_add(course.step as u64);
+                let tried = |action| {
+                    branch.go_back_to(&course);
+                    let mut draws = Streams::new(!seed, number);
+                    let earned = branch.followed(Some(action), LITTLE, &mut draws);
+                    (earned, branch.step - course.step)
+                };
+                let tried: Vec<(f64, usize)> = (0..self.model.actions.len()).map(tried).collect();
+                steps += tried.iter().map(|(_, steps)| steps).sum::<usize>();
+                let values: Vec<f64> = tried.iter().map(|(earned, _)| *earned).collect();
+                judged.push(Judged {
+                    belief: course.held.belief().clone(),
+                    moments: course.held.moments().cloned(),
+                    value: Some(values[own]),
+                    values,
+                    counts: counts / likely,
+                });
+            }
+            counts *= discount;
+            if !course.take(own, &mut draws).goes_on {
+                break;
+            }
+        }
+        (judged, steps + course.step)
+    }
+}
+
+impl<'a> Course<'a> {
+    /// The same episode at the same step as another, to be gone on with otherwise.
+    fn go_back_to(&mut self, other: &Self) {
+        self.world.resume(&other.world);
+        self.updater = other.updater;
+        self.held.clone_from(&other.held);
+        self.step = other.step;
+    }
+
+    fn take(&mut self, action: ActionId, draws: &mut Streams) -> Paid {
+        let expected = self.updater.act(&mut self.held, action);
+        let step = self.world.step(action, draws, &mut self.observation);
+        match (step.then, expected.is_some()) {
+            (Then::Continue, true) => {
+                let reading = self.observation.reading();
+                self.updater.sense(&mut self.held, action, reading);
+            }
+            (Then::Continue, false) => {
+                let reading = self.observation.reading();
+                self.updater.update(&mut self.held, action, reading);
+            }
+            (Then::Restart, _) => self.updater.reset(&mut self.held),
+            (Then::End, _) => {}
+        }
+        self.step += 1;
+        Paid {
+            reward: expected.map_or(step.reward, |expected| expected.reward),
+            goes_on: step.then != Then::End && is_kept(&self.held.belief().mean),
+        }
+    }
+
+    /// Goes on by the policy, once it has taken the first action if there is one, and returns what that earns from here; no further than
+    /// where what is left counts for less than `little`.
+    fn followed(&mut self, first: Option<ActionId>, little: f64, draws: &mut Streams) -> f64 {
+        let model = self.runs.model;
+        let (mut earned, mut counts, mut next) = (0.0, 1.0, first);
+        while self.step < model.episode.length && counts >= little {
+            let own = || self.runs.policy.action_in_full(&self.held);
+            let action = next.take().unwrap_or_else(own);
+            let paid = self.take(action, draws);
+            earned += counts * paid.reward;
+            counts *= model.discount;
+            if !paid.goes_on {
+                break;
+            }
+        }
+        earned + counts * self.world.ending()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::belief::Belief;
+    use crate::progress::Silent;
+    use crate::scenario::find;
+    use crate::simulate::{Options, evaluate};
+    use crate::solve::{Planner, PointBased, Problem, Request};
+
+    /// Does one thing everywhere.
+    struct Always(ActionId);
+
+    impl Policy for Always {
+        fn action(&self, _: &Belief) -> ActionId {
+            self.0
+        }
+    }
+
+    #[test]
+    fn what_is_expected_is_what_is_earned() {
+        let model = find("light-dark-5").unwrap().model;
+        let planner = PointBased {
+            beliefs: 100,
+            rounds: 4,
+            ..PointBased::default()
+        };
+        let request = Request {
+            runs: 100,
+            ..Request::default()
+        };
+        let plan = crate::solve::plan(&planner, &model, &request, &Silent).unwrap();
+        let automaton = plan.automaton().unwrap();
+        let space = automaton.space(&model);
+        let expected = expected(space.as_ref(), automaton, 20_000, 3);
+        let options = Options {
+            episodes: 4000,
+            seed: 5,
+        };
+        let assumed = Scenario::assumed(&model);
+        let earned = evaluate(&assumed, &automaton.updater, automaton, options, &Silent);
+        // An error rate of 1e-4.
+        let apart = (expected.mean - earned.discounted.mean).abs();
+        let error = expected.stderr.hypot(earned.discounted.stderr);
+        assert!(apart < 4.0 * error, "{expected:?}, {earned:?}");
+        assert!(expected.stderr > 0.0);
+    }
+
+    #[test]
+    fn deviating_costs_what_the_first_step_does_where_all_else_is_the_same() {
+        // To stop pays at once; whoever goes UP first and then for ever is paid nothing.
+        let model = find("light-dark-5").unwrap().model;
+        let problem_request = Request::default();
+        let problem = Problem::new(&model, &problem_request);
+        let planner = PointBased {
+            beliefs: 1,
+            rounds: 1,
+            ..PointBased::default()
+        };
+        let plan = planner.plan(&problem, &Silent).unwrap();
+        let crate::solve::Found::Rule { space, .. } = plan.policy else {
+            panic!("a rule");
+        };
+        let up = Always(1);
+        let budget = Budget {
+            deviations: 60,
+            steps: 1_000_000,
+        };
+        let judged = deviations(space.as_ref(), &up, budget, 1);
+        assert!(judged.len() >= 60);
+        let counted: f64 = judged.iter().map(|judged| judged.counts).sum();
+        assert!((counted - 10.0).abs() < 3.0, "{counted}");
+        for judged in judged {
+            assert_eq!(judged.values[1..], [0.0, 0.0]);
+            assert_eq!(judged.value, Some(0.0));
+            assert!(judged.values[0].abs() < 10.0 + 1e-9, "{judged:?}");
+        }
+    }
+}
