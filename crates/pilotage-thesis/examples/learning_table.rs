@@ -27,7 +27,7 @@ const PROBLEMS: [&str; 6] = [
     "maze-4x4",
     "cart-load-unload",
     "stations-5x5",
-    "shuttle",
+    "shuttle-blind",
     "cart-pole-sd",
 ];
 

@@ -373,7 +373,7 @@ pub fn figure_3_15(context: &Context<'_>) -> Result<Finding> {
     reproduced(
         context,
         &Problem {
-            model: "shuttle",
+            model: "shuttle-blind",
             title: "Figures 3.15 and 3.16: ARKAQ and the shuttle",
             thesis: "The hidden state is revealed, as with the load.",
             vigilances: &[0.5, 0.9],
@@ -459,7 +459,7 @@ pub fn figure_6_2(context: &Context<'_>) -> Result<Finding> {
         ("basic", 0.1, at as Learner),
         ("maze-4x4", 0.8, at),
         ("cart-load-unload", 0.5, at),
-        ("shuttle", 0.5, remembering),
+        ("shuttle-blind", 0.5, remembering),
     ] {
         let scenario = problem(name)?;
         let best = baseline(context, &scenario)?;

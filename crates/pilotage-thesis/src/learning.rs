@@ -269,7 +269,7 @@ pub fn figure_4_16(context: &Context<'_>) -> Result<Finding> {
     reproduced(
         context,
         &Problem {
-            model: "shuttle",
+            model: "shuttle-blind",
             title: "Figures 4.16 and 4.17: KAFAQ and the shuttle",
             thesis: "Four states; MOVE and TURN follow each other; stable after 47 steps.",
             regions: Some(4),

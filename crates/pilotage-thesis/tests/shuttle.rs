@@ -13,7 +13,7 @@ use pilotage_thesis::baseline::baselines;
 /// Two docks, and which way the shuttle faces is to be told from the last three steps.
 #[test]
 fn a_longer_memory_finds_which_way_the_shuttle_faces_and_merges_into_a_handful_of_states() {
-    let scenario = scenario::find("shuttle").unwrap();
+    let scenario = scenario::find("shuttle-blind").unwrap();
     let short = Settings {
         lambda: 0.9,
         vigilances: vec![0.5],

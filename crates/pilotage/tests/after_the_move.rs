@@ -110,7 +110,7 @@ fn stations_match() {
 
 #[test]
 fn the_shuttle_moves_the_way_it_faces_and_docks_backwards() {
-    let scenario = still("shuttle", &[0.5], 0);
+    let scenario = still("shuttle-blind", &[0.5], 0);
     let plan = [
         "MOVE", "MOVE", "TURN", "TURN", "TURN", "MOVE", "MOVE", "MOVE", "TURN",
     ];

@@ -54,7 +54,7 @@ const CASES: &[Case] = &[
         ],
     },
     Case {
-        model: "shuttle",
+        model: "shuttle-blind",
         own: "",
         worlds: &[
             "[world]\nwalls = \"clamp\"",
@@ -202,7 +202,7 @@ fn the_assumed_world_is_what_the_belief_expects() {
         ("basic", true),
         ("tiger", true),
         ("corridor", false),
-        ("shuttle", false),
+        ("shuttle-blind", false),
         ("cart-pole", false),
         ("robot-basic", false),
     ] {

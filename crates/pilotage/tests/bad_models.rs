@@ -198,7 +198,7 @@ const MISTAKES: &[Mistake] = &[
     row("maze-4x4", "uniform = { x = [0.0, 4.0], y = [0.0, 4.0] }", "uniform = { x = [0.0, 4.0] }", "{ x", "y", "y"),
     row("basic", "uniform = { x = [0.0, 4.0] }", "uniform = { x = [0.0, 4.0] }\nmean = [1.0]", "mean", "uniform", "uniform"),
     row("basic", "uniform = { x = [0.0, 4.0] }", "uniform = { x = [-inf, 4.0] }", "[-inf", "is no box", "two numbers"),
-    row("shuttle", "[[world.motion.control]]", "[[world.motion.controls]]", "controls", "unknown key `controls`", "`control`"),
+    row("shuttle-blind", "[[world.motion.control]]", "[[world.motion.controls]]", "controls", "unknown key `controls`", "`control`"),
     // A rule of thumb.
     row("thermostat", "do = \"HEAT\"", "do = \"HEET\"", "\"HEET\"", "unknown action `HEET`", "`HEAT`"),
     row("thermostat", "when = \"temperature <", "when = \"temperatur <", "temperatur <", "unknown name `temperatur`", "`temperature`"),

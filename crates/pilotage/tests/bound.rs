@@ -178,7 +178,7 @@ fn nothing_earns_more() {
         ("basic", with("basic", |_| {})),
         ("basic-inner", with("basic-inner", |_| {})),
         ("cart-load-unload", with("cart-load-unload", |_| {})),
-        ("shuttle", with("shuttle", |_| {})),
+        ("shuttle-blind", with("shuttle-blind", |_| {})),
         ("corridor", with("corridor", |_| {})),
         ("maze-2d", with("maze-2d", |_| {})),
         ("tiger-sd", with("tiger-sd", |_| {})),

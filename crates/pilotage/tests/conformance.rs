@@ -256,6 +256,9 @@ fn every_model_has_a_solver_and_every_solver_a_model() {
         ("light-dark-5", "point-based"),
         ("light-dark-2d", "codebook"),
         ("scalar-lqg", "value-iteration"),
+        ("cart-load-unload", "point-based"),
+        ("load-unload", "value-iteration"),
+        ("shuttle", "point-based"),
     ] {
         assert_eq!(first(&scenario::find(name).unwrap().model), expected);
     }

@@ -279,7 +279,7 @@ fn the_page_runs_policies_as_the_library_does() {
         (changing(), "value-iteration", Nearest),
         (scenario("tiger"), "value-iteration", Nearest),
         (scenario("load-unload"), "value-iteration", Nearest),
-        (scenario("shuttle"), "value-iteration", Segments),
+        (scenario("shuttle-blind"), "value-iteration", Segments),
         (scenario("maze-2d"), "value-iteration", Nearest),
         (scenario("u-maze"), "value-iteration", Segments),
         (scenario("cart-pole"), "policy-search", Nearest),

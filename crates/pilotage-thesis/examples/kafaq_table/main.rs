@@ -30,7 +30,7 @@ const PROBLEMS: [&str; 6] = [
     "maze-4x4",
     "cart-load-unload",
     "stations-5x5",
-    "shuttle",
+    "shuttle-blind",
 ];
 
 /// Problems that are also there for a robot.

@@ -289,6 +289,13 @@ impl Dynamics {
         }
     }
 
+    /// `H`, row by row, where numbers are read and no formula says which.
+    pub fn linear_observation(&self, doing: Doing) -> Option<&[f64]> {
+        let rule = self.rule(doing);
+        let linear = self.symbols == 0 && rule.read.is_empty();
+        linear.then_some(&rule.h)
+    }
+
     /// Writes the covariance of the noise that is added to it, `m x m`.
     pub fn observation_noise(&self, doing: Doing, state: &[f64], covariance: &mut [f64]) {
         let rule = self.rule(doing);

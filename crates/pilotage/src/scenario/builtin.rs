@@ -44,6 +44,7 @@ const MODELS: &[(&str, &str)] = models![
     "cart-load-unload",
     "stations-5x5",
     "shuttle",
+    "shuttle-blind",
     "robot-basic",
     "robot-maze-4x4",
     "robot-cart-load-unload",

@@ -59,17 +59,20 @@ pub(crate) fn deviations(
     all
 }
 
-/// What a policy earns, by at least so many steps of episodes. The same for any number of threads.
-pub(crate) fn expected(
+/// What a policy earns in each of the first episodes of a seed, as many as make so many steps; fewer once it is plainly worse than another
+/// whose returns in them are known. The same for any number of threads.
+pub(crate) fn returns(
     space: &dyn BeliefSpace,
     policy: &dyn Policy,
     steps: usize,
     seed: u64,
-) -> Estimate {
+    other: Option<&[f64]>,
+) -> Vec<f64> {
     let runs = Runs::new(space, policy);
     let mut returns: Vec<f64> = Vec::new();
     let mut taken = 0;
-    while returns.len() < FEWEST || taken < steps {
+    let worse = |returns: &[f64]| other.is_some_and(|other| plainly_worse(returns, other));
+    while returns.len() < FEWEST || (taken < steps && !worse(&returns)) {
         let first = returns.len();
         let together = parallel::map(TOGETHER, |i| runs.plain(seed, (first + i) as u64));
         for (earned, steps) in together {
@@ -77,7 +80,20 @@ pub(crate) fn expected(
             taken += steps;
         }
     }
-    Estimate::of(returns.iter().copied())
+    returns
+}
+
+/// How much more is earned than by another, in the episodes that both have.
+pub(crate) fn gain(returns: &[f64], other: &[f64]) -> Estimate {
+    let count = returns.len().min(other.len());
+    let pairs = returns[..count].iter().zip(&other[..count]);
+    Estimate::of(pairs.map(|(own, other)| own - other))
+}
+
+/// Whether less is earned, by four standard errors.
+fn plainly_worse(returns: &[f64], other: &[f64]) -> bool {
+    let gain = gain(returns, other);
+    gain.mean + 4.0 * gain.stderr < 0.0
 }
 
 /// Episodes of a policy.
@@ -267,7 +283,8 @@ mod tests {
         let plan = crate::solve::plan(&planner, &model, &request, &Silent).unwrap();
         let automaton = plan.automaton().unwrap();
         let space = automaton.space(&model);
-        let expected = expected(space.as_ref(), automaton, 20_000, 3);
+        let returns = returns(space.as_ref(), automaton, 20_000, 3, None);
+        let expected = Estimate::of(returns.iter().copied());
         let options = Options {
             episodes: 4000,
             seed: 5,
@@ -282,20 +299,40 @@ mod tests {
     }
 
     #[test]
-    fn deviating_costs_what_the_first_step_does_where_all_else_is_the_same() {
-        // To stop pays at once; whoever goes UP first and then for ever is paid nothing.
+    fn who_is_plainly_worse_is_not_run_to_the_end() {
         let model = find("light-dark-5").unwrap().model;
-        let problem_request = Request::default();
-        let problem = Problem::new(&model, &problem_request);
+        let space = cells_of(&model);
+        let steps = 20_000;
+        let up = returns(space.as_ref(), &Always(1), steps, 1, None);
+        assert_eq!(up, vec![0.0; 224], "a hundred steps each, 32 at a time");
+        let stop = returns(space.as_ref(), &Always(0), steps, 1, Some(&up));
+        assert!(stop.len() < 100 && gain(&stop, &up).mean < 0.0);
+        let same = returns(space.as_ref(), &Always(2), steps, 1, Some(&up));
+        assert_eq!(gain(&same, &up), Estimate::of([0.0, 0.0].into_iter()));
+        assert_eq!(same.len(), up.len());
+    }
+
+    fn cells_of(model: &Model) -> Box<dyn BeliefSpace> {
+        let request = Request::default();
         let planner = PointBased {
             beliefs: 1,
             rounds: 1,
             ..PointBased::default()
         };
-        let plan = planner.plan(&problem, &Silent).unwrap();
-        let crate::solve::Found::Rule { space, .. } = plan.policy else {
-            panic!("a rule");
-        };
+        let plan = planner
+            .plan(&Problem::new(model, &request), &Silent)
+            .unwrap();
+        match plan.policy {
+            crate::solve::Found::Rule { space, .. } => space,
+            _ => panic!("a rule"),
+        }
+    }
+
+    #[test]
+    fn deviating_costs_what_the_first_step_does_where_all_else_is_the_same() {
+        // To stop pays at once; whoever goes UP first and then for ever is paid nothing.
+        let model = find("light-dark-5").unwrap().model;
+        let space = cells_of(&model);
         let up = Always(1);
         let budget = Budget {
             deviations: 60,

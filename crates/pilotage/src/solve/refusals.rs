@@ -1,6 +1,6 @@
 //! What planners refuse for the same reasons, with what would do.
 
-use crate::model::{Interval, Model, When};
+use crate::model::{Event, Interval, Model, When};
 
 /// Those that maximise reward need some.
 pub(super) fn nothing_paid(model: &Model) -> Option<String> {
@@ -83,4 +83,17 @@ pub(super) fn bound_missing(model: &Model) -> Option<String> {
         "`{}` has no bounds to put a grid between; add `bounds` to [state]",
         unbounded.name
     ))
+}
+
+/// Whether a mode changes at a place while the agent is not sure where it is, so that it has to guess the mode from then on.
+pub(super) fn guesses_modes(model: &Model) -> bool {
+    let placed = |event: &Event| event.becomes.is_some() && !event.region.sides.is_empty();
+    let moved = |action| model.motion_noise(action, 0).amax() > 0.0;
+    let starts = || {
+        model
+            .start
+            .iter()
+            .any(|start| start.covariance.amax() > 0.0)
+    };
+    model.events.iter().any(placed) && (starts() || (0..model.actions.len()).any(moved))
 }

@@ -17,7 +17,7 @@ const PROBLEMS: [&str; 9] = [
     "load-unload",
     "maze-2d",
     "u-maze",
-    "shuttle",
+    "shuttle-blind",
     "cart-pole",
     THIN_WALLS,
 ];

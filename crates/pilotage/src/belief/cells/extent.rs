@@ -11,6 +11,11 @@ const CELLS: [usize; 2] = [200, 40];
 /// Most cells in all, modes apart.
 const MOST: usize = 100_000;
 
+/// Fewest cells along a variable where the model does not say, and how many lie at least in a standard deviation of all noise, and in the
+/// narrowest place where something is paid or happens: finer ones say nothing more.
+const FEWEST: f64 = 40.0;
+const WITHIN: f64 = 8.0;
+
 /// Where a variable has no bound, cells go so many standard deviations beyond every start.
 const SPREAD: f64 = 5.0;
 
@@ -39,8 +44,11 @@ pub(super) fn grid(model: &Model, dynamics: &Dynamics) -> Result<Grid> {
             ),
         ));
     };
-    let count = model.belief.cells.unwrap_or(*usual).max(2);
-    let axes: Vec<Axis> = (0..n).map(|i| axis(model, dynamics, i, count)).collect();
+    let count = |variable: usize| match model.belief.cells {
+        Some(cells) => cells.max(2),
+        None => enough(model, dynamics, variable, *usual),
+    };
+    let axes: Vec<Axis> = (0..n).map(|i| axis(model, dynamics, i, count(i))).collect();
     let all = axes.iter().map(|axis| axis.count as f64).product::<f64>();
     if all > MOST as f64 || all.is_nan() {
         return Err(unsupported(
@@ -85,6 +93,50 @@ fn axis(model: &Model, dynamics: &Dynamics, variable: usize, count: usize) -> Ax
         count: count + beyond[0] + beyond[1],
         kind,
     }
+}
+
+/// How many cells it takes, and no more than usual.
+fn enough(model: &Model, dynamics: &Dynamics, variable: usize, usual: usize) -> usize {
+    let width = extent(model, dynamics, variable).width();
+    match narrowest(model, dynamics, variable) {
+        Some(narrowest) => {
+            let count = (WITHIN * width / narrowest).ceil().max(FEWEST);
+            count.min(usual as f64) as usize
+        }
+        None => usual,
+    }
+}
+
+/// The least standard deviation of all noise, in units of a variable, and side of all places where something is paid or happens; `None` if
+/// there is motion or sensing without noise, or if noise or what is sensed depends on the state.
+fn narrowest(model: &Model, dynamics: &Dynamics, variable: usize) -> Option<f64> {
+    let (n, m) = (model.state_dim(), dynamics.readings());
+    let rewards = model.rewards.iter().map(|reward| &reward.region);
+    let regions = rewards.chain(model.events.iter().map(|event| &event.region));
+    let sides = regions.map(|region| region.side(variable).width());
+    let mut least = sides.fold(f64::INFINITY, f64::min);
+    for mode in 0..dynamics.modes() {
+        for action in 0..dynamics.actions() {
+            let doing = Doing {
+                mode,
+                action,
+                step: 0,
+            };
+            let moved = dynamics.constant_transition_noise(doing)?[variable * (n + 1)];
+            least = least.min(moved.max(0.0).sqrt());
+            let (rows, noise) = (
+                dynamics.linear_observation(doing)?,
+                dynamics.constant_observation_noise(doing)?,
+            );
+            for k in 0..m {
+                let slope = rows[k * n + variable].abs();
+                if slope > 0.0 {
+                    least = least.min(noise[k * (m + 1)].max(0.0).sqrt() / slope);
+                }
+            }
+        }
+    }
+    (least > 0.0 && least.is_finite()).then_some(least)
 }
 
 /// How far cells go on beyond bounds that are no walls to the belief, on either side. Who goes there is as lost as before; were it the

@@ -51,6 +51,11 @@ impl Planner for ValueIteration {
         refuse_if(SOLVER, model, reason)
     }
 
+    /// A level has one mode, which is not so where it changes at a place and the belief is not sure of being there.
+    fn suits(&self, model: &Model) -> bool {
+        !refusals::guesses_modes(model)
+    }
+
     fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
         let policy = solve(problem.mdp(), &self.grid, observer)?;
         // Levels that tell the time are others than the problem's.

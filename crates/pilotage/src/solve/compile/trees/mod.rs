@@ -78,9 +78,13 @@ pub(super) fn grow(
         seed,
         bare: automaton.clone(),
     };
-    let mut tried = search.imitate();
-    search.improve(&mut tried);
-    if let Some(chosen) = search.chosen(tried) {
+    let mut trials = Trials::default();
+    search.imitate(&mut trials);
+    // Who says only what to do, and not what that is worth, is to be imitated.
+    if search.judge_knows_values() {
+        search.improve(&mut trials);
+    }
+    if let Some(chosen) = trials.smallest(size.loss) {
         *automaton = chosen;
     }
 }
@@ -95,10 +99,47 @@ struct Search<'a> {
     bare: Automaton,
 }
 
-/// A tree with what it earns.
+/// A tree with what it earns in each of some episodes, which are the same for all.
 struct Tried {
-    earned: f64,
+    returns: Vec<f64>,
     tree: Automaton,
+}
+
+/// Trees that were tried, and which of them earns most.
+#[derive(Default)]
+struct Trials {
+    tried: Vec<Tried>,
+    best: usize,
+}
+
+impl Trials {
+    fn best(&self) -> Option<&Tried> {
+        self.tried.get(self.best)
+    }
+
+    fn add(&mut self, tried: Tried) {
+        let better = self
+            .best()
+            .is_none_or(|best| deviation::gain(&tried.returns, &best.returns).mean > 0.0);
+        if better {
+            self.best = self.tried.len();
+        }
+        self.tried.push(tried);
+    }
+
+    /// The smallest tree that earns hardly less than the best: by at most a share of what that earns.
+    fn smallest(&self, loss: f64) -> Option<Automaton> {
+        let best = self.best()?;
+        let earned = best.returns.iter().sum::<f64>() / best.returns.len() as f64;
+        let lost = |tried: &Tried| -deviation::gain(&tried.returns, &best.returns).mean;
+        let enough = |tried: &&Tried| lost(tried) <= loss * earned.abs();
+        let order = |a: &Tried, b: &Tried| {
+            let nodes = a.tree.nodes.len().cmp(&b.tree.nodes.len());
+            nodes.then(lost(a).total_cmp(&lost(b)))
+        };
+        let kept = self.tried.iter().filter(enough);
+        Some(kept.min_by(|a, b| order(a, b))?.tree.clone())
+    }
 }
 
 impl Search<'_> {
@@ -106,8 +147,14 @@ impl Search<'_> {
         (each * self.episodes as f64).ceil() as usize
     }
 
+    fn judge_knows_values(&self) -> bool {
+        let start = self.bare.updater.start();
+        let read = || self.policy.action_value(start.belief(), 0).is_some();
+        self.policy.values_in_full(&start).is_some() || read()
+    }
+
     /// Trees grown on what the policy expects at the beliefs that they meet.
-    fn imitate(&self) -> Vec<Tried> {
+    fn imitate(&self, trials: &mut Trials) {
         let length = self.space.model().episode.length;
         let start = self.bare.updater.start();
         let most = self.times(match self.policy.values_in_full(&start) {
@@ -130,7 +177,7 @@ impl Search<'_> {
             ));
             tree = Some(self.of_size(&collected, &mut Growth::new(&collected), self.imitated()));
         }
-        self.of_sizes(&collected)
+        self.try_sizes(&collected, trials);
     }
 
     /// Nodes of a tree that collects beliefs for the next.
@@ -140,64 +187,54 @@ impl Search<'_> {
     }
 
     /// Trees grown on what the best so far earns if it once does something else.
-    fn improve(&self, tried: &mut Vec<Tried>) {
+    fn improve(&self, trials: &mut Trials) {
         let budget = Budget {
             deviations: self.times(DEVIATIONS),
             steps: self.times(STEPS),
         };
         let mut collected = Collected::new(self.space, &self.bare);
         for round in 0..IMPROVING {
-            let Some(best) = best(tried) else { return };
+            let Some(best) = trials.best() else { return };
             let runner = AutomatonRunner::new(&best.tree);
             let seed = self.seed.wrapping_add((IMITATING + round) as u64);
             collected.extend(deviation::deviations(self.space, &runner, budget, seed));
-            tried.extend(self.of_sizes(&collected));
+            self.try_sizes(&collected, trials);
         }
     }
 
-    /// The smallest tree that earns hardly less than the best.
-    fn chosen(&self, mut tried: Vec<Tried>) -> Option<Automaton> {
-        let best = best(&tried)?.earned;
-        let enough = best - self.size.loss * best.abs();
-        let nodes = |tried: &Tried| tried.tree.nodes.len();
-        tried.retain(|tried| tried.earned >= enough);
-        let least = tried.iter().map(nodes).min()?;
-        tried.retain(|tried| nodes(tried) == least);
-        tried.sort_by(|a, b| b.earned.total_cmp(&a.earned));
-        tried.into_iter().next().map(|tried| tried.tree)
-    }
-
-    /// Trees of many sizes, as far as larger ones earn more.
-    fn of_sizes(&self, collected: &Collected) -> Vec<Tried> {
+    /// Tries trees of many sizes, as far as larger ones earn more.
+    fn try_sizes(&self, collected: &Collected, trials: &mut Trials) {
         let mut growth = Growth::new(collected);
-        let mut tried: Vec<Tried> = Vec::new();
-        let mut most = f64::NEG_INFINITY;
-        let mut since = 0;
+        let first = trials.tried.len();
+        let (mut best, mut since) = (first, 0);
         for nodes in sizes(self.size.nodes) {
             let tree = self.of_size(collected, &mut growth, nodes);
-            if tried.iter().any(|known| known.tree.tree == tree.tree) {
-                since += 1;
-            } else {
-                let earned = self.earned(&tree);
-                since = match earned > most + 0.1 * self.size.loss * most.abs() {
-                    true => 0,
-                    false => since + 1,
-                };
-                most = most.max(earned);
-                tried.push(Tried { earned, tree });
+            since += 1;
+            let known = trials.tried[first..].iter();
+            if !known
+                .map(|known| &known.tree.tree)
+                .any(|known| *known == tree.tree)
+            {
+                let returns = self.returns(&tree, trials);
+                trials.add(Tried { returns, tree });
+                let new = trials.tried.len() - 1;
+                let returns = |i: usize| &trials.tried[i].returns;
+                if new == first || deviation::gain(returns(new), returns(best)).mean > 0.0 {
+                    (best, since) = (new, 0);
+                }
             }
-            if since >= PATIENCE && nodes >= FEW {
+            if nodes >= FEW && since >= PATIENCE {
                 break;
             }
         }
-        tried
     }
 
     /// What a tree earns where the model holds, in the same episodes as every other.
-    fn earned(&self, tree: &Automaton) -> f64 {
+    fn returns(&self, tree: &Automaton, trials: &Trials) -> Vec<f64> {
         let seed = self.seed.wrapping_add((IMITATING + IMPROVING) as u64);
+        let other = trials.best().map(|best| best.returns.as_slice());
         let runner = AutomatonRunner::new(tree);
-        deviation::expected(self.space, &runner, self.times(TRIAL_STEPS), seed).mean
+        deviation::returns(self.space, &runner, self.times(TRIAL_STEPS), seed, other)
     }
 
     /// A tree of at most so many nodes: grown larger, made better, and cut back.
@@ -210,11 +247,6 @@ impl Search<'_> {
         write(&shape, collected, &mut tree);
         tree
     }
-}
-
-fn best(tried: &[Tried]) -> Option<&Tried> {
-    let better = |a: &&Tried, b: &&Tried| a.earned.total_cmp(&b.earned);
-    tried.iter().max_by(better)
 }
 
 /// Leaves to which a tree is grown before it is cut back to so many.
