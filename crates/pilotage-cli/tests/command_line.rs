@@ -39,7 +39,7 @@ fn json(arguments: &[&str]) -> String {
 
 #[test]
 fn a_seed_gives_the_same_bytes_with_one_thread_and_with_many() {
-    for problem in ["corridor", "corridor-declare", "tiger"] {
+    for problem in ["corridor-blind", "corridor-declare", "tiger"] {
         for (solver, settings) in [
             ("value-iteration", "points=201"),
             ("kbvi", "last_horizon=5"),
@@ -76,7 +76,7 @@ fn a_saved_policy_earns_what_it_earned_when_it_was_found() {
     let policy = policy.to_str().unwrap();
     let found: Value = serde_json::from_str(&json(&[
         "solve",
-        "corridor",
+        "corridor-blind",
         "--episodes",
         "2000",
         "--seed",
@@ -88,7 +88,7 @@ fn a_saved_policy_earns_what_it_earned_when_it_was_found() {
     .unwrap();
     let run: Value = serde_json::from_str(&json(&[
         "simulate",
-        "corridor",
+        "corridor-blind",
         "--policy",
         policy,
         "--episodes",
@@ -146,7 +146,7 @@ fn drawing_writes_an_automaton_and_a_map() {
 #[test]
 fn output_that_people_read_stays_as_it_is() {
     insta::assert_snapshot!("list", printed(&["list"]));
-    insta::assert_snapshot!("check", printed(&["check", "corridor"]));
+    insta::assert_snapshot!("check", printed(&["check", "corridor-blind"]));
     let solved = printed(&[
         "solve",
         "corridor-declare",
@@ -237,17 +237,17 @@ fn what_cannot_be_done_is_one_message() {
         (&["check", &at("bytes.toml")], "bytes.toml"),
         (&["solve", "coridor"], "did you mean `corridor`?"),
         (
-            &["solve", "corridor", "--with", "value-iterat"],
+            &["solve", "corridor-blind", "--with", "value-iterat"],
             "did you mean `value-iteration`?",
         ),
         (
-            &["solve", "corridor", "--policy", "segment"],
+            &["solve", "corridor-blind", "--policy", "segment"],
             "did you mean `segments`?",
         ),
         (
             &[
                 "solve",
-                "corridor",
+                "corridor-blind",
                 "--policy",
                 "grid",
                 "--out",
@@ -255,23 +255,26 @@ fn what_cannot_be_done_is_one_message() {
             ],
             "cannot be saved",
         ),
-        (&["solve", "corridor", "--episodes", "0"], "at least 1"),
         (
-            &["solve", "corridor", "--with", "kafaq", "--grid", "41"],
+            &["solve", "corridor-blind", "--episodes", "0"],
+            "at least 1",
+        ),
+        (
+            &["solve", "corridor-blind", "--with", "kafaq", "--grid", "41"],
             "--grid is for --with value-iteration or --with qmdp or --with mls or --with codebook; kafaq has the settings `",
         ),
         (
-            &["solve", "corridor", "--set", "lambda=0.5"],
+            &["solve", "corridor-blind", "--set", "lambda=0.5"],
             "lambda is for --with kafaq or --with arkaq; value-iteration has the settings `memory`, `points`",
         ),
         (
-            &["solve", "corridor", "--set", "point=41"],
+            &["solve", "corridor-blind", "--set", "point=41"],
             "did you mean `points`?",
         ),
         (
             &[
                 "solve",
-                "corridor",
+                "corridor-blind",
                 "--effort",
                 "nan",
                 "--with",
@@ -302,7 +305,7 @@ fn what_cannot_be_done_is_one_message() {
             "--checkpoint and --curves are for learners",
         ),
         (
-            &["solve", "corridor", "--with", "lqg"],
+            &["solve", "corridor-blind", "--with", "lqg"],
             "lqg does not accept corridor",
         ),
         (
@@ -310,11 +313,11 @@ fn what_cannot_be_done_is_one_message() {
             "MiB",
         ),
         (
-            &["simulate", "corridor", "--policy", &at("tiger.json")],
+            &["simulate", "corridor-blind", "--policy", &at("tiger.json")],
             "tiger",
         ),
         (
-            &["simulate", "corridor", "--policy", &at("broken.json")],
+            &["simulate", "corridor-blind", "--policy", &at("broken.json")],
             "broken.json",
         ),
         (

@@ -394,7 +394,7 @@ fn extreme_settings_are_refused_by_name() {
     for (settings, says) in rows {
         refused(
             folder.path(),
-            &[&["solve", "corridor"], *settings].concat(),
+            &[&["solve", "corridor-blind"], *settings].concat(),
             says,
         );
     }
@@ -542,7 +542,7 @@ fn a_path_that_is_not_utf8_is_a_path() {
         OsStr::from_bytes(b"hall\xff.toml"),
         OsStr::from_bytes(b"p\xfe.json"),
     );
-    fs::write(folder.path().join(model), built_in("corridor")).unwrap();
+    fs::write(folder.path().join(model), built_in("corridor-blind")).unwrap();
     let (out, problem) = (OsStr::new("--out"), OsStr::new("--problem"));
     let word = OsStr::new;
     let episodes = [word("--episodes"), word("10")];
@@ -585,7 +585,7 @@ fn models_beyond_all_numbers_are_refused_by_every_verb() {
     let folder = tempfile::tempdir().unwrap();
     for (base, good, bad, says) in [
         (
-            "corridor",
+            "corridor-blind",
             "H = [[1.0]]",
             "H = [[-1e308]]",
             "uncertainty level 0",
@@ -603,7 +603,7 @@ fn models_beyond_all_numbers_are_refused_by_every_verb() {
             "shorter `step`",
         ),
         (
-            "corridor",
+            "corridor-blind",
             "name = \"corridor\"",
             "name = \"\\u001b[31mred\"",
             "\\u{1b}",
@@ -662,7 +662,7 @@ fn a_policy_does_not_choose_the_files_that_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     fs::write(here.join("secret"), "password = 'abc'").unwrap();
-    fs::write(here.join("corridor.toml"), built_in("corridor")).unwrap();
+    fs::write(here.join("corridor.toml"), built_in("corridor-blind")).unwrap();
     assert!(solve_to(here, "p.json").status.success());
     for named in ["secret", "./secret", "corridor.toml"] {
         edit(&here.join("p.json"), |policy| {
@@ -687,7 +687,7 @@ fn a_policy_whose_numbers_lead_nowhere_is_refused_or_says_so() {
     let whole = fs::read_to_string(&file).unwrap();
     let simulate = [
         "simulate",
-        "corridor",
+        "corridor-blind",
         "--policy",
         "p.json",
         "--episodes",
@@ -753,7 +753,7 @@ fn nothing_that_a_terminal_obeys_is_printed() {
     let here = folder.path();
     let (escape, wrong) = ("\u{1b}]0;owned\u{7}", "a\u{1b}[2J.toml");
     let (policy, setting) = ("p\u{1b}[2J.json", "a\u{1b}=1");
-    let corridor = built_in("corridor");
+    let corridor = built_in("corridor-blind");
     fs::write(here.join(wrong), &corridor).unwrap();
     for (file, old, new) in [
         ("raw.toml", "EAST", escape),
@@ -782,13 +782,20 @@ fn nothing_that_a_terminal_obeys_is_printed() {
         &["draw", "policy.json"],
         &["draw", "newer.json"],
         &["draw", escape],
-        &["solve", "corridor", "--with", escape],
-        &["solve", "corridor", "--policy", escape],
-        &["solve", "corridor", "--seed", escape],
-        &["solve", "corridor", "--set", setting],
-        &["solve", "corridor", "--set", escape],
-        &["solve", "corridor", "--with", "kafaq", "--learn", setting],
-        &["solve", "corridor", escape],
+        &["solve", "corridor-blind", "--with", escape],
+        &["solve", "corridor-blind", "--policy", escape],
+        &["solve", "corridor-blind", "--seed", escape],
+        &["solve", "corridor-blind", "--set", setting],
+        &["solve", "corridor-blind", "--set", escape],
+        &[
+            "solve",
+            "corridor-blind",
+            "--with",
+            "kafaq",
+            "--learn",
+            setting,
+        ],
+        &["solve", "corridor-blind", escape],
         &["reproduce", "--only", escape],
         &["solve", "basic", "--with", "kafaq", "--checkpoint", policy],
         &[

@@ -149,8 +149,8 @@ fn a_name_mistyped_brings_the_file_or_the_problem_that_was_meant() {
         // A problem that is built in, though a file is as near; and the other way about.
         ("tigeer", Some("tiger")),
         ("tigeer.toml", Some("tigger.toml")),
-        ("coridor", Some("corridor")),
-        ("coridor.toml", Some("corridor")),
+        ("coridor", Some("corridor-blind")),
+        ("coridor.toml", Some("corridor-blind")),
         ("note", None),
         ("nowhere/hallway.toml", None),
         ("zzzzzzzzzzzz", None),
@@ -215,7 +215,7 @@ fn the_command_on_the_last_line_of_solve_draws() {
 fn work_that_is_short_says_nothing_in_a_pipe() {
     let output = run(
         &std::env::temp_dir(),
-        &["solve", "corridor", "--episodes", "100"],
+        &["solve", "corridor-blind", "--episodes", "100"],
     );
     assert!(output.status.success());
     assert_eq!(String::from_utf8(output.stderr).unwrap(), "");

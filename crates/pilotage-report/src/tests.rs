@@ -35,7 +35,7 @@ fn solved(name: &str, matching: Matching) -> (BeliefMdp, value_iteration::GridPo
 
 /// Three nodes that take turns, as in Figure 5.12.
 fn by_hand() -> Automaton {
-    let mut automaton = Automaton::new(&mdp("corridor"), "hand", Matching::Segments);
+    let mut automaton = Automaton::new(&mdp("corridor-blind"), "hand", Matching::Segments);
     let node = |low: f64, high: f64, action, visits, predecessors: &[(usize, f64)]| {
         let place = Place::Segment {
             lower: vec![low],
@@ -207,13 +207,13 @@ fn automaton_by_hand() {
 
 #[test]
 fn corridor_automaton() {
-    let (_, _, automaton) = solved("corridor", Matching::Nearest);
+    let (_, _, automaton) = solved("corridor-blind", Matching::Nearest);
     insta::assert_snapshot!(automaton_svg(&automaton).expect("sound"));
 }
 
 #[test]
 fn corridor_belief_map() {
-    let (mdp, policy, automaton) = solved("corridor", Matching::Segments);
+    let (mdp, policy, automaton) = solved("corridor-blind", Matching::Segments);
     insta::assert_snapshot!(belief_map_svg(&mdp, &policy, Some(&automaton)).expect("sound"));
 }
 
@@ -221,7 +221,7 @@ fn corridor_belief_map() {
 fn automata_of_every_size_are_readable() {
     for count in [0, 1, 2, 3, 7, 15, 24, 40, 41, 90] {
         for (name, matching) in [
-            ("corridor", Matching::Segments),
+            ("corridor-blind", Matching::Segments),
             ("load-unload", Matching::Nearest),
             ("cart-pole", Matching::Nearest),
         ] {
@@ -239,7 +239,7 @@ fn automata_of_every_size_are_readable() {
 
 #[test]
 fn automata_of_problems_are_readable() {
-    for name in ["corridor", "corridor-declare", "tiger", "load-unload"] {
+    for name in ["corridor-blind", "corridor-declare", "tiger", "load-unload"] {
         for matching in [Matching::Nearest, Matching::Segments] {
             let (mdp, policy, automaton) = solved(name, matching);
             let svg = automaton_svg(&automaton).expect("sound");
@@ -253,7 +253,7 @@ fn automata_of_problems_are_readable() {
 #[test]
 fn belief_maps_of_every_kind_are_readable() {
     for name in [
-        "corridor",
+        "corridor-blind",
         "tiger",
         "load-unload",
         "maze-2d",
@@ -296,7 +296,7 @@ fn what_is_not_a_number_is_refused() {
     automaton.nodes[1].place = Place::Point(vec![f64::NAN]);
     let message = automaton_svg(&automaton).expect_err("NaN").to_string();
     assert!(message.contains("node 1"), "{message}");
-    assert!(belief_map_svg(&mdp("corridor"), &Stripes(3), Some(&automaton)).is_err());
+    assert!(belief_map_svg(&mdp("corridor-blind"), &Stripes(3), Some(&automaton)).is_err());
     assert!(belief_map_svg(&mdp("maze-2d"), &Stripes(5), Some(&by_hand())).is_err());
 }
 

@@ -10,7 +10,7 @@ use pilotage::solve::{Form, Kbvi, Registry, Request, Solver, solve};
 const SEED: u64 = 1;
 const EPISODES: usize = 100_000;
 const PROBLEMS: [&str; 6] = [
-    "corridor",
+    "corridor-blind",
     "corridor-unbounded",
     "corridor-declare",
     "tiger",
@@ -83,7 +83,7 @@ fn beside_table_6_1(earned: &[Row]) {
             Form::Segments,
             0.93,
             [
-                ("corridor", "walls stop the robot"),
+                ("corridor-blind", "walls stop the robot"),
                 ("corridor-unbounded", "no walls"),
             ],
         ),
@@ -92,7 +92,7 @@ fn beside_table_6_1(earned: &[Row]) {
             Form::Nearest,
             0.47,
             [
-                ("corridor", "walls stop the robot"),
+                ("corridor-blind", "walls stop the robot"),
                 ("corridor-unbounded", "no walls"),
             ],
         ),

@@ -166,7 +166,7 @@ pub fn figures_5_3_and_5_4(context: &Context<'_>) -> Result<Finding> {
 
 /// The levels.
 pub fn figure_5_6(_: &Context<'_>) -> Result<Finding> {
-    let model = problem("corridor")?.model;
+    let model = problem("corridor-blind")?.model;
     let mdp = BeliefMdp::new(&model);
     let levels = mdp.levels();
     let variances: Vec<f64> = (0..levels.len())
@@ -334,11 +334,11 @@ pub fn figures_5_11_to_5_13(context: &Context<'_>) -> Result<Finding> {
         "RIGHT until the goal at every horizon; convergence horizon 5 for both forms; stop the closer to the right end, the more uncertain.",
     );
     let mut rows = Vec::new();
-    for name in ["corridor-unbounded", "corridor"] {
+    for name in ["corridor-unbounded", "corridor-blind"] {
         let scenario = problem(name)?;
         for form in FORMS {
             let (row, found) = thesis_style(context, &scenario, form, RewardFormula::Ramp)?;
-            if name == "corridor" {
+            if name == "corridor-blind" {
                 draft = draft.map(
                     format!("Representative beliefs, {}", form.name()),
                     &scenario.model,
@@ -364,7 +364,7 @@ pub fn figures_5_11_to_5_13(context: &Context<'_>) -> Result<Finding> {
             "–".to_owned(),
             shown(context.earned(&scenario, &planned)?.discounted),
         ]);
-        if name == "corridor" {
+        if name == "corridor-blind" {
             draft = draft.automaton("The compiled automaton: three nodes", found)?;
         }
     }
@@ -493,7 +493,7 @@ pub fn convergence(context: &Context<'_>) -> Result<Finding> {
     let last = context.either(20, 12);
     let mut series = Vec::new();
     let mut rows = Vec::new();
-    for (name, claimed) in [("tiger", 13), ("tiger-sd", 13), ("corridor", 5)] {
+    for (name, claimed) in [("tiger", 13), ("tiger-sd", 13), ("corridor-blind", 5)] {
         let mdp = BeliefMdp::new(&problem(name)?.model);
         for matching in [Matching::Segments, Matching::Nearest] {
             let settings = generate::Settings {

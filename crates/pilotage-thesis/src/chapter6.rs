@@ -15,13 +15,13 @@ const TABLE_6_1: [(&str, Form, f64, [&str; 2]); 4] = [
         "1D maze",
         Form::Segments,
         0.93,
-        ["corridor", "corridor-unbounded"],
+        ["corridor-blind", "corridor-unbounded"],
     ),
     (
         "1D maze",
         Form::Nearest,
         0.47,
-        ["corridor", "corridor-unbounded"],
+        ["corridor-blind", "corridor-unbounded"],
     ),
 ];
 

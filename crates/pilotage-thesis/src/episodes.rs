@@ -17,7 +17,7 @@ use crate::error::Result;
 pub fn episodes(seed: u64, observer: &dyn Progress) -> Result<Vec<Recording>> {
     let shown = [
         (
-            "corridor",
+            "corridor-blind",
             12,
             "A corridor",
             "The robot is paid in the last cell. Each move and each reading is noisy; the curve is what the robot makes of them. It knows nothing of the walls, so its belief may run past the end.",

@@ -7,7 +7,7 @@ use pilotage_thesis::episodes;
 fn three_episodes_open_the_report() {
     let recordings = episodes(1, &Silent).expect("built-in models");
     let ids: Vec<&str> = recordings.iter().map(|each| &*each.id).collect();
-    assert_eq!(ids, ["corridor", "load-unload", "u-maze"]);
+    assert_eq!(ids, ["corridor-blind", "load-unload", "u-maze"]);
     for recording in &recordings {
         assert!(!recording.places.is_empty() && !recording.walls.is_empty());
     }

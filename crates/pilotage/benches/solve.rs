@@ -26,7 +26,7 @@ fn whole() -> Evaluation {
 
 #[divan::bench]
 fn read() -> Scenario {
-    scenario::find("corridor").unwrap()
+    scenario::find("corridor-blind").unwrap()
 }
 
 #[divan::bench(sample_count = 10)]

@@ -72,7 +72,7 @@ fn four_dimensions_few_nodes(bencher: Bencher, nodes: usize) {
 }
 
 fn corridor() -> value_iteration::GridPolicy {
-    let mdp = BeliefMdp::new(&scenario::find("corridor").unwrap().model);
+    let mdp = BeliefMdp::new(&scenario::find("corridor-blind").unwrap().model);
     value_iteration::solve(&mdp, &value_iteration::Settings::default(), &Silent).unwrap()
 }
 

@@ -37,9 +37,9 @@ const LINE: &[&str] = &[
 const POLE: &str = "[world.cart-pole]\ncart_mass = 0.5\npole_mass = 0.2\nfriction = 0.1\nlength = 0.3\ninertia = 0.006\ngravity = 9.8\nstep = 0.02\nforce_noise = 0.45";
 
 const CASES: &[Case] = &[
-    line("corridor"),
+    line("corridor-blind"),
     line("corridor-unbounded"),
-    line("corridor-walls"),
+    line("corridor"),
     line("corridor-declare"),
     line("basic"),
     Case {
@@ -198,10 +198,10 @@ fn the_assumed_world_is_what_the_belief_expects() {
     let as_assumed = |name: &str| scenario::find(name).unwrap().is_as_assumed();
     for (name, expected) in [
         ("corridor-unbounded", true),
-        ("corridor-walls", true),
+        ("corridor", true),
         ("basic", true),
         ("tiger", true),
-        ("corridor", false),
+        ("corridor-blind", false),
         ("shuttle-blind", false),
         ("cart-pole", false),
         ("robot-basic", false),

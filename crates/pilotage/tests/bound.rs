@@ -68,7 +68,7 @@ fn it_lies_just_above_the_best_values_that_are_known() {
         ("corridor-unbounded", 0.82928, 0.001),
         ("tiger", 4.1064, 0.001),
         ("load-unload", 1.311_139, 0.001),
-        ("corridor-walls", 1.5593, 0.001),
+        ("corridor", 1.5593, 0.001),
         ("maze-2d-unbounded", 0.26230, 0.03),
     ] {
         let found = bounded(&built_in(name));
@@ -179,30 +179,30 @@ fn nothing_earns_more() {
         ("basic-inner", with("basic-inner", |_| {})),
         ("cart-load-unload", with("cart-load-unload", |_| {})),
         ("shuttle-blind", with("shuttle-blind", |_| {})),
-        ("corridor", with("corridor", |_| {})),
+        ("corridor-blind", with("corridor-blind", |_| {})),
         ("maze-2d", with("maze-2d", |_| {})),
         ("tiger-sd", with("tiger-sd", |_| {})),
         (
             "walls and little noise",
-            with("corridor-walls", motion_noise(0.01)),
+            with("corridor", motion_noise(0.01)),
         ),
-        ("walls and none", with("corridor-walls", motion_noise(0.0))),
+        ("walls and none", with("corridor", motion_noise(0.0))),
         (
             "walls, none, a sharp sensor",
-            with("corridor-walls", |model| {
+            with("corridor", |model| {
                 motion_noise(0.0)(model);
                 sensor_noise(1e-4)(model);
             }),
         ),
         (
             "walls and a goal between them",
-            with("corridor-walls", |model| {
+            with("corridor", |model| {
                 model.rewards[0].region = goal(1.7, 2.4);
             }),
         ),
         (
             "a blind agent",
-            with("corridor-walls", |model| model.sensor.h = number(0.0)),
+            with("corridor", |model| model.sensor.h = number(0.0)),
         ),
         (
             "a state that turns",
@@ -332,7 +332,7 @@ fn a_coarse_grid_is_looser_and_still_above() {
     };
     above("corridor-declare", &[31, 61, 121, 481, 1921], 2.6875);
     above("corridor-unbounded", &[31, 61, 121, 481], 0.82928);
-    above("corridor-walls", &[4, 8, 16, 64], 1.5593);
+    above("corridor", &[4, 8, 16, 64], 1.5593);
     above("maze-2d-unbounded", &[61, 121, 241], 0.26230);
 }
 
@@ -361,7 +361,7 @@ fn a_hidden_mode_is_not_taken_for_known() {
 #[test]
 fn every_model_has_a_bound_with_a_reason_or_a_refusal() {
     let beliefs = [
-        "corridor",
+        "corridor-blind",
         "corridor-declare",
         "corridor-unbounded",
         "maze-2d",
@@ -401,10 +401,10 @@ fn settings_and_numbers_out_of_range_are_refused() {
         let settings = Settings {
             points: Some(points),
         };
-        let refused = bound(&built_in("corridor"), &settings, &Silent);
+        let refused = bound(&built_in("corridor-blind"), &settings, &Silent);
         assert!(matches!(refused, Err(Error::Setting { .. })), "{points}");
     }
-    let mut model = built_in("corridor");
+    let mut model = built_in("corridor-blind");
     model.rewards[0].value = 1e308;
     let refused = bound(&model, &Settings::default(), &Silent);
     assert!(

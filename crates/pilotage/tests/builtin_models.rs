@@ -82,7 +82,7 @@ fn the_gallery_and_light_and_dark_have_rules_of_thumb() {
         assert!(action < model.actions.len(), "{name}");
         assert!(model.discount < 1.0, "{name}");
     }
-    assert_eq!(scenario("corridor").rule, None);
+    assert_eq!(scenario("corridor-blind").rule, None);
     let fingerprint = model("thermostat").fingerprint();
     let text = scenario::builtin("thermostat").unwrap();
     let other = text.replacen("20.5", "19.5", 1);
@@ -97,7 +97,7 @@ fn the_corridor() {
         model: corridor,
         truth,
         ..
-    } = scenario("corridor");
+    } = scenario("corridor-blind");
     assert_eq!(action_names(&corridor), ["EAST", "WEST", "STOP"]);
     assert_eq!(corridor.state[0].bounds, Interval::new(0.0, 4.0));
     assert_eq!(
@@ -231,7 +231,7 @@ fn the_cart_and_pole_are_held_exactly_over_a_step() {
 
 #[test]
 fn actions_keep_the_order_of_the_file() {
-    let text = scenario::builtin("corridor").unwrap();
+    let text = scenario::builtin("corridor-blind").unwrap();
     let east = "EAST = { u = [1.0] }\n";
     let last = text
         .replacen(east, "", 1)

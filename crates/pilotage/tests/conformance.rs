@@ -251,7 +251,7 @@ fn every_model_has_a_solver_and_every_solver_a_model() {
     }
     let first = |model: &Model| registry.first_for(model).unwrap().name();
     for (name, expected) in [
-        ("corridor", "value-iteration"),
+        ("corridor-blind", "value-iteration"),
         ("cart-pole", "policy-search"),
         ("light-dark-5", "point-based"),
         ("light-dark-2d", "codebook"),

@@ -78,7 +78,7 @@ fn solved(name: &str, points: usize, matching: Matching) -> (Vec<u64>, Automaton
 #[test]
 fn solving_and_evaluating_do_not_depend_on_threads() {
     for (name, points, matching) in [
-        ("corridor", 201, Matching::Nearest),
+        ("corridor-blind", 201, Matching::Nearest),
         ("tiger", 201, Matching::Segments),
         ("maze-2d", 31, Matching::Nearest),
     ] {
@@ -101,7 +101,7 @@ fn generating_does_not_depend_on_threads() {
             runs: 20,
             ..generate::Settings::default()
         };
-        let mdp = BeliefMdp::new(&built_in("corridor"));
+        let mdp = BeliefMdp::new(&built_in("corridor-blind"));
         let generated = generate::generate(&mdp, &settings, &Silent).unwrap();
         (generated.automaton, generated.history)
     };
@@ -111,7 +111,7 @@ fn generating_does_not_depend_on_threads() {
 
 #[test]
 fn another_seed_gives_other_episodes() {
-    let scenario = scenario("corridor");
+    let scenario = scenario("corridor-blind");
     let mdp = BeliefMdp::new(&scenario.model);
     let earned = |seed| {
         let policy = pilotage::policy::AutomatonRunner::new(&Automaton::new(

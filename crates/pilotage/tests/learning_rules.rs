@@ -37,7 +37,7 @@ fn segments(automaton: &Automaton) -> Vec<(usize, Vec<f64>, Vec<f64>, usize, Opt
 
 #[test]
 fn a_segment_is_extended_by_beliefs_with_its_action() {
-    let mut automaton = empty("corridor", Matching::Segments);
+    let mut automaton = empty("corridor-blind", Matching::Segments);
     for (mean, value) in [(1.0, 0.5), (2.0, 0.3), (0.5, 0.4)] {
         assert_eq!(automaton.learn(&belief(0, &[mean]), 0, value), 0);
     }
@@ -53,7 +53,7 @@ fn a_segment_is_extended_by_beliefs_with_its_action() {
 
 #[test]
 fn a_segment_is_split_half_way_to_its_point_of_least_value() {
-    let mut automaton = empty("corridor", Matching::Segments);
+    let mut automaton = empty("corridor-blind", Matching::Segments);
     for (mean, value) in [(0.0, 0.1), (4.0, 0.9)] {
         automaton.learn(&belief(0, &[mean]), 0, value);
     }
@@ -69,7 +69,7 @@ fn a_segment_is_split_half_way_to_its_point_of_least_value() {
 
 #[test]
 fn a_segment_does_not_grow_over_another() {
-    let mut automaton = empty("corridor", Matching::Segments);
+    let mut automaton = empty("corridor-blind", Matching::Segments);
     for (mean, action) in [(0.0, 0), (1.0, 2), (2.0, 0)] {
         automaton.learn(&belief(0, &[mean]), action, 0.0);
     }
@@ -81,7 +81,7 @@ fn a_segment_does_not_grow_over_another() {
 
 #[test]
 fn nearest_points_are_added_where_the_action_differs() {
-    let mut automaton = empty("corridor", Matching::Nearest);
+    let mut automaton = empty("corridor-blind", Matching::Nearest);
     let learned = [(0.0, 0), (1.0, 0), (4.0, 1), (2.5, 1), (2.4, 0), (9.0, 1)];
     let nodes: Vec<usize> = learned
         .iter()
@@ -93,7 +93,7 @@ fn nearest_points_are_added_where_the_action_differs() {
 /// A belief whose action turns out to be another takes the new one, and leaves no double behind.
 #[test]
 fn a_point_can_change_its_mind() {
-    let mut automaton = empty("corridor", Matching::Nearest);
+    let mut automaton = empty("corridor-blind", Matching::Nearest);
     for action in [0, 1, 0, 2] {
         automaton.learn(&belief(0, &[1.0]), action, 0.0);
         assert_eq!(automaton.action(&belief(0, &[1.0])), action);
@@ -103,7 +103,7 @@ fn a_point_can_change_its_mind() {
 
 #[test]
 fn merging_joins_what_nothing_keeps_apart() {
-    let mut automaton = empty("corridor", Matching::Segments);
+    let mut automaton = empty("corridor-blind", Matching::Segments);
     let segment = |low: f64, high: f64| Place::Segment {
         lower: vec![low],
         minimum: vec![low],
@@ -164,7 +164,7 @@ proptest! {
 
     #[test]
     fn every_belief_gets_its_latest_action((dims, lessons) in lessons()) {
-        let name = ["corridor", "maze-2d"][dims - 1];
+        let name = ["corridor-blind", "maze-2d"][dims - 1];
         for matching in [Matching::Nearest, Matching::Segments] {
             let mut automaton = empty(name, matching);
             for (level, mean, action, value) in &lessons {
@@ -182,7 +182,7 @@ proptest! {
 
     #[test]
     fn points_of_least_value_stay_inside((dims, lessons) in lessons()) {
-        let mut automaton = empty(["corridor", "maze-2d"][dims - 1], Matching::Segments);
+        let mut automaton = empty(["corridor-blind", "maze-2d"][dims - 1], Matching::Segments);
         for (level, mean, action, value) in &lessons {
             automaton.learn(&belief(*level, &mean[..dims]), *action, *value);
         }
@@ -200,7 +200,7 @@ proptest! {
     /// segment may come to lie on a border, where either side may decide.)
     #[test]
     fn merging_keeps_what_segments_do((dims, lessons) in lessons()) {
-        let mut automaton = empty(["corridor", "maze-2d"][dims - 1], Matching::Segments);
+        let mut automaton = empty(["corridor-blind", "maze-2d"][dims - 1], Matching::Segments);
         for (level, mean, action, value) in &lessons {
             automaton.learn(&belief(*level, &mean[..dims]), *action, *value);
         }
@@ -223,7 +223,7 @@ proptest! {
     /// it has been told often enough.
     #[test]
     fn points_reproduce_consistent_lessons((dims, lessons) in lessons()) {
-        let mut automaton = empty(["corridor", "maze-2d"][dims - 1], Matching::Nearest);
+        let mut automaton = empty(["corridor-blind", "maze-2d"][dims - 1], Matching::Nearest);
         let taught = |mean: &[f64]| usize::from(mean[0] > 1.7) + usize::from(mean[dims - 1] > 3.1);
         for _ in 0..=lessons.len() {
             for (level, mean, _, _) in &lessons {

@@ -52,13 +52,13 @@ fn the_last_level_is_the_steady_state() {
 
 #[test]
 fn the_corridor_converges_to_0_232946() {
-    for name in ["corridor", "corridor-unbounded", "corridor-declare"] {
+    for name in ["corridor-blind", "corridor-unbounded", "corridor-declare"] {
         let mdp = BeliefMdp::new(&built_in(name));
         let steady = mdp.levels().steady(0, 0).unwrap();
         let covariance = mdp.covariance(steady)[0];
         assert!((covariance - 0.232946).abs() < 5e-7, "{covariance}");
     }
-    let model = built_in("corridor");
+    let model = built_in("corridor-blind");
     let sequence = [0.3, 0.2475, 0.2363, 0.2337, 0.2331, 0.2330];
     let graph = graph(&model);
     for (level, expected) in sequence.into_iter().enumerate() {
@@ -307,19 +307,19 @@ proptest! {
 fn what_cannot_be_multiplied_is_refused_with_level_and_entry() {
     for (name, good, bad, says) in [
         (
-            "corridor",
+            "corridor-blind",
             "H = [[1.0]]",
             "H = [[-1e308]]",
             "level 0 is that of no belief: entry [0][0] of the innovation covariance of the step by EAST is inf",
         ),
         (
-            "corridor",
+            "corridor-blind",
             "A = [[1.0]]",
             "A = [[1e200]]",
             "predicted covariance",
         ),
         (
-            "corridor",
+            "corridor-blind",
             "noise = [[0.45]]",
             "noise = [[1.7e308]]",
             "innovation covariance",

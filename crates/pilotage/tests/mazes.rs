@@ -166,7 +166,7 @@ fn in_the_corridor_knowing_the_walls_is_worth_a_quarter_more() {
         let policy = automaton(&mdp, &plan(&mdp), 300);
         evaluate(&scenario, &policy.updater, &policy, options, &Silent).discounted
     };
-    let (knows, plain) = (earned("corridor-walls"), earned("corridor"));
+    let (knows, plain) = (earned("corridor"), earned("corridor-blind"));
     assert!(
         knows.stderr < 0.0035 && (1.545..1.575).contains(&knows.mean),
         "{knows:?}"
@@ -179,7 +179,7 @@ fn in_the_corridor_knowing_the_walls_is_worth_a_quarter_more() {
 
 #[test]
 fn corridor_walls_is_the_corridor_with_another_belief() {
-    let (walls, corridor) = (find("corridor-walls").model, find("corridor").model);
+    let (walls, corridor) = (find("corridor").model, find("corridor-blind").model);
     let same = with_walls(&corridor, WallBelief::Clip);
     assert_eq!(walls.fingerprint(), same.fingerprint());
 }

@@ -114,7 +114,7 @@ fn exact_levels(name: &str) -> Model {
 
 #[test]
 fn the_search_finds_what_trying_all_finds() {
-    for name in ["corridor", "corridor-unbounded", "corridor-declare"] {
+    for name in ["corridor-blind", "corridor-unbounded", "corridor-declare"] {
         let model = exact_levels(name);
         let mdp = BeliefMdp::new(&model);
         for horizon in 0..=6 {
@@ -145,7 +145,7 @@ fn the_search_finds_what_trying_all_finds_with_the_ramp() {
             spread,
             ..Formulas::default()
         };
-        for name in ["corridor", "corridor-declare"] {
+        for name in ["corridor-blind", "corridor-declare"] {
             let mdp = BeliefMdp::new(&exact_levels(name));
             for mean in [0.0, 2.2, 3.5] {
                 let found = search(&mdp, 5, formulas).q_values(&belief(&mdp, mean));
@@ -270,7 +270,7 @@ fn the_search_listens_as_trying_all_does() {
 #[test]
 fn the_worth_of_a_sequence_does_not_depend_on_the_sensor() {
     let q_with_noise = |noise: f64, formulas: Formulas| {
-        let mut model = exact_levels("corridor");
+        let mut model = exact_levels("corridor-blind");
         model.sensor.noise = DMatrix::from_element(1, 1, noise);
         // How far outside the bounds a mean may be does depend on the sensor.
         model.state[0].bounds = Interval::new(-100.0, 100.0);

@@ -133,7 +133,7 @@ impl CellTracker<'_> {
 /// In the corridor walls stop the robot, and its Kalman filter does not know. The same plan, on a belief that does, earns more.
 #[test]
 fn a_histogram_that_knows_of_walls_takes_the_place_of_the_filter() {
-    let scenario = scenario::find("corridor").unwrap();
+    let scenario = scenario::find("corridor-blind").unwrap();
     let mdp = BeliefMdp::new(&scenario.model);
     let request = Request::form(Form::Nearest);
     let solver = ValueIteration::default();

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 #[test]
 fn a_policy_of_another_problem_is_refused() {
     let automaton = one_node();
-    let corridor = built_in("corridor");
+    let corridor = built_in("corridor-blind");
     assert!(automaton.check_problem(&corridor, "policy.json").is_ok());
     let refused = |model: &Model| {
         automaton
@@ -62,8 +62,7 @@ fn files_of_other_formats_are_refused() {
         (0, "0.0.1", "solve again to renew it"),
         (3, "7.1.0", "use that version, or solve again"),
     ] {
-        let file =
-            json!({"format": format, "pilotage": version, "automaton": {"problem": "corridor"}});
+        let file = json!({"format": format, "pilotage": version, "automaton": {"problem": "corridor-blind"}});
         let reason = reason(&file.to_string());
         let written = format!("policy format {format} was written by pilotage {version}");
         for part in [written.as_str(), &this, advice] {

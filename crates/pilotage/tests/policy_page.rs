@@ -236,7 +236,7 @@ fn solved(scenario: &Scenario, name: &str, form: Form) -> Automaton {
 
 /// The corridor with an action that does not disturb the state: two noise classes.
 fn still() -> Scenario {
-    let mut scenario = scenario("corridor");
+    let mut scenario = scenario("corridor-blind");
     let noise = &scenario.model.motion.noise * 0.0;
     scenario.model.actions[2].motion_noise = Some(noise);
     scenario
@@ -273,7 +273,7 @@ fn the_page_runs_policies_as_the_library_does() {
     use Form::{Nearest, Segments};
     let mut said = [false; 11];
     for (scenario, kind, form) in [
-        (scenario("corridor"), "value-iteration", Nearest),
+        (scenario("corridor-blind"), "value-iteration", Nearest),
         (scenario("corridor-declare"), "value-iteration", Segments),
         (still(), "value-iteration", Nearest),
         (changing(), "value-iteration", Nearest),

@@ -216,9 +216,13 @@ fn in_the_n_one_hypothesis_is_left_after_the_first_step_by_merging_and_not_by_we
 
 #[test]
 fn only_what_can_be_woken_up_is() {
-    let one = HypothesisTracker::new(&mdp("corridor"), HypothesisSettings::default(), all_alike)
-        .map(drop)
-        .unwrap_err();
+    let one = HypothesisTracker::new(
+        &mdp("corridor-blind"),
+        HypothesisSettings::default(),
+        all_alike,
+    )
+    .map(drop)
+    .unwrap_err();
     let text = one.to_string();
     assert!(
         text.contains("wake-up does not accept corridor") && text.contains("one start"),

@@ -58,7 +58,7 @@ fn recording(text: &str) -> Recording {
         reward: 1.0,
     };
     Recording {
-        id: "corridor".to_owned(),
+        id: "corridor-blind".to_owned(),
         title: text.to_owned(),
         about: text.to_owned(),
         states: vec![text.to_owned()],

@@ -23,8 +23,8 @@ macro_rules! models {
 const MODELS: &[(&str, &str)] = models![
     in "":
     "corridor",
+    "corridor-blind",
     "corridor-unbounded",
-    "corridor-walls",
     "corridor-declare",
     "tiger",
     "tiger-sd",

@@ -24,7 +24,7 @@ const MOST_MEBIBYTES: u64 = 8;
 /// that is not valid (see [`Scenario::validate`]): with line, column and a hint.
 ///
 /// ```
-/// let text = pilotage::scenario::builtin("corridor").ok_or("no corridor")?;
+/// let text = pilotage::scenario::builtin("corridor-blind").ok_or("no corridor")?;
 /// let mistaken = text.replace("discount = 0.75", "discount = 1.75");
 /// let error = pilotage::scenario::read(&mistaken, "my-corridor.toml").expect_err("a discount above 1");
 /// assert!(error.to_string().starts_with("my-corridor.toml:"));

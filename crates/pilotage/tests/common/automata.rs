@@ -11,8 +11,8 @@ use super::built_in;
 
 /// Problems with one to four variables, with and without modes, walls and a map.
 const PROBLEMS: [&str; 9] = [
+    "corridor-blind",
     "corridor",
-    "corridor-walls",
     "tiger",
     "load-unload",
     "maze-2d",
@@ -93,7 +93,7 @@ pub fn empty(name: &str, matching: Matching) -> Automaton {
 
 /// An automaton with one node, all of whose numbers are known.
 pub fn one_node() -> Automaton {
-    let mut automaton = empty("corridor", Matching::Segments);
+    let mut automaton = empty("corridor-blind", Matching::Segments);
     let place = Place::Segment {
         lower: vec![-1.0],
         minimum: vec![0.0],

@@ -181,8 +181,8 @@ fn policies() -> Reader {
         node.place = pilotage::policy::Place::Point(vec![node.place.centre()[0]]);
     }
     let automata = [
-        planned("corridor", Matching::Nearest),
-        planned("corridor", Matching::Segments),
+        planned("corridor-blind", Matching::Nearest),
+        planned("corridor-blind", Matching::Segments),
         planned("maze-2d", Matching::Segments),
         planned("u-maze", Matching::Nearest),
         planned("load-unload", Matching::Nearest),
@@ -192,7 +192,7 @@ fn policies() -> Reader {
         learned_by_arkaq(),
     ];
     let text = |automaton: &Automaton| automaton.to_json().expect("a policy").into_bytes();
-    let corridor = built_in("corridor");
+    let corridor = built_in("corridor-blind");
     Reader {
         name: "policies",
         corpus: automata.iter().map(text).collect(),
