@@ -604,7 +604,7 @@ fn models_beyond_all_numbers_are_refused_by_every_verb() {
         ),
         (
             "corridor-blind",
-            "name = \"corridor\"",
+            "name = \"corridor-blind\"",
             "name = \"\\u001b[31mred\"",
             "\\u{1b}",
         ),
@@ -681,7 +681,7 @@ fn a_policy_whose_numbers_lead_nowhere_is_refused_or_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let file = here.join("p.json");
-    let solve = "solve corridor --episodes 10 --grid 101 --out p.json";
+    let solve = "solve corridor-blind --episodes 10 --grid 101 --out p.json";
     let solve: Vec<&str> = solve.split(' ').collect();
     assert!(pilotage(here, &solve).output().unwrap().status.success());
     let whole = fs::read_to_string(&file).unwrap();

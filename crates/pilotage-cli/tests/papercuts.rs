@@ -149,8 +149,8 @@ fn a_name_mistyped_brings_the_file_or_the_problem_that_was_meant() {
         // A problem that is built in, though a file is as near; and the other way about.
         ("tigeer", Some("tiger")),
         ("tigeer.toml", Some("tigger.toml")),
-        ("coridor", Some("corridor-blind")),
-        ("coridor.toml", Some("corridor-blind")),
+        ("coridor", Some("corridor")),
+        ("coridor.toml", Some("corridor")),
         ("note", None),
         ("nowhere/hallway.toml", None),
         ("zzzzzzzzzzzz", None),

@@ -16,17 +16,14 @@ use crate::world::{Observation, ProblemWorld, Streams, World};
 /// How much may be run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Budget {
-    /// Beliefs from which every action is tried.
-    pub deviations: usize,
-    /// Steps in all.
+    /// Episodes that are run however long they are.
+    pub episodes: usize,
+    /// Steps in all beyond which no more episodes are begun.
     pub steps: usize,
 }
 
 /// Episodes that are run together before the budget is looked at.
-const TOGETHER: usize = 32;
-
-/// Episodes that are run however long they are.
-const FEWEST: usize = 40;
+const TOGETHER: usize = 16;
 
 /// Beliefs of an episode that is never over early from which every action is tried, on average.
 const EACH: f64 = 1.5;
@@ -34,18 +31,19 @@ const EACH: f64 = 1.5;
 /// A return is not followed further once what is left counts for so little.
 const LITTLE: f64 = 1e-3;
 
-/// Beliefs that a policy meets, the likelier chosen the more a step counts, with what it earns from there if it begins with each action.
-/// The same for any number of threads.
+/// Beliefs that a policy meets, about `most`, the likelier chosen the more a step counts, with what it earns from there if it begins with
+/// each action. The same for any number of threads.
 pub(crate) fn deviations(
     space: &dyn BeliefSpace,
     policy: &dyn Policy,
+    most: usize,
     budget: Budget,
     seed: u64,
 ) -> Vec<Judged> {
     let runs = Runs::new(space, policy);
     let mut all: Vec<Judged> = Vec::new();
     let (mut episodes, mut steps) = (0, 0);
-    while episodes < FEWEST || (all.len() < budget.deviations && steps < budget.steps) {
+    while episodes < budget.episodes || (all.len() < most && steps < budget.steps) {
         let together = parallel::map(TOGETHER, |i| runs.deviating(seed, (episodes + i) as u64));
         for (judged, taken) in together {
             all.extend(judged);
@@ -64,7 +62,7 @@ pub(crate) fn deviations(
 pub(crate) fn returns(
     space: &dyn BeliefSpace,
     policy: &dyn Policy,
-    steps: usize,
+    budget: Budget,
     seed: u64,
     other: Option<&[f64]>,
 ) -> Vec<f64> {
@@ -72,7 +70,7 @@ pub(crate) fn returns(
     let mut returns: Vec<f64> = Vec::new();
     let mut taken = 0;
     let worse = |returns: &[f64]| other.is_some_and(|other| plainly_worse(returns, other));
-    while returns.len() < FEWEST || (taken < steps && !worse(&returns)) {
+    while returns.len() < budget.episodes || (taken < budget.steps && !worse(&returns)) {
         let first = returns.len();
         let together = parallel::map(TOGETHER, |i| runs.plain(seed, (first + i) as u64));
         for (earned, steps) in together {
@@ -259,6 +257,11 @@ mod tests {
     use crate::simulate::{Options, evaluate};
     use crate::solve::{Planner, PointBased, Problem, Request};
 
+    const BUDGET: Budget = Budget {
+        episodes: 40,
+        steps: 20_000,
+    };
+
     /// Does one thing everywhere.
     struct Always(ActionId);
 
@@ -283,7 +286,7 @@ mod tests {
         let plan = crate::solve::plan(&planner, &model, &request, &Silent).unwrap();
         let automaton = plan.automaton().unwrap();
         let space = automaton.space(&model);
-        let returns = returns(space.as_ref(), automaton, 20_000, 3, None);
+        let returns = returns(space.as_ref(), automaton, BUDGET, 3, None);
         let expected = Estimate::of(returns.iter().copied());
         let options = Options {
             episodes: 4000,
@@ -302,12 +305,11 @@ mod tests {
     fn who_is_plainly_worse_is_not_run_to_the_end() {
         let model = find("light-dark-5").unwrap().model;
         let space = cells_of(&model);
-        let steps = 20_000;
-        let up = returns(space.as_ref(), &Always(1), steps, 1, None);
-        assert_eq!(up, vec![0.0; 224], "a hundred steps each, 32 at a time");
-        let stop = returns(space.as_ref(), &Always(0), steps, 1, Some(&up));
+        let up = returns(space.as_ref(), &Always(1), BUDGET, 1, None);
+        assert_eq!(up, vec![0.0; 208], "a hundred steps each, 16 at a time");
+        let stop = returns(space.as_ref(), &Always(0), BUDGET, 1, Some(&up));
         assert!(stop.len() < 100 && gain(&stop, &up).mean < 0.0);
-        let same = returns(space.as_ref(), &Always(2), steps, 1, Some(&up));
+        let same = returns(space.as_ref(), &Always(2), BUDGET, 1, Some(&up));
         assert_eq!(gain(&same, &up), Estimate::of([0.0, 0.0].into_iter()));
         assert_eq!(same.len(), up.len());
     }
@@ -334,11 +336,7 @@ mod tests {
         let model = find("light-dark-5").unwrap().model;
         let space = cells_of(&model);
         let up = Always(1);
-        let budget = Budget {
-            deviations: 60,
-            steps: 1_000_000,
-        };
-        let judged = deviations(space.as_ref(), &up, budget, 1);
+        let judged = deviations(space.as_ref(), &up, 60, BUDGET, 1);
         assert!(judged.len() >= 60);
         let counted: f64 = judged.iter().map(|judged| judged.counts).sum();
         assert!((counted - 10.0).abs() < 3.0, "{counted}");

@@ -147,6 +147,14 @@ impl Search<'_> {
         (each * self.episodes as f64).ceil() as usize
     }
 
+    /// As many steps for each episode that was asked for; a fiftieth of the episodes, 4 to 40, in any case.
+    fn budget(&self, steps: f64) -> Budget {
+        Budget {
+            episodes: (self.episodes / 50).clamp(4, 40),
+            steps: self.times(steps),
+        }
+    }
+
     fn judge_knows_values(&self) -> bool {
         let start = self.bare.updater.start();
         let read = || self.policy.action_value(start.belief(), 0).is_some();
@@ -188,16 +196,16 @@ impl Search<'_> {
 
     /// Trees grown on what the best so far earns if it once does something else.
     fn improve(&self, trials: &mut Trials) {
-        let budget = Budget {
-            deviations: self.times(DEVIATIONS),
-            steps: self.times(STEPS),
-        };
+        let most = self.times(DEVIATIONS);
+        let budget = self.budget(STEPS);
         let mut collected = Collected::new(self.space, &self.bare);
         for round in 0..IMPROVING {
             let Some(best) = trials.best() else { return };
             let runner = AutomatonRunner::new(&best.tree);
             let seed = self.seed.wrapping_add((IMITATING + round) as u64);
-            collected.extend(deviation::deviations(self.space, &runner, budget, seed));
+            collected.extend(deviation::deviations(
+                self.space, &runner, most, budget, seed,
+            ));
             self.try_sizes(&collected, trials);
         }
     }
@@ -234,7 +242,7 @@ impl Search<'_> {
         let seed = self.seed.wrapping_add((IMITATING + IMPROVING) as u64);
         let other = trials.best().map(|best| best.returns.as_slice());
         let runner = AutomatonRunner::new(tree);
-        deviation::returns(self.space, &runner, self.times(TRIAL_STEPS), seed, other)
+        deviation::returns(self.space, &runner, self.budget(TRIAL_STEPS), seed, other)
     }
 
     /// A tree of at most so many nodes: grown larger, made better, and cut back.
