@@ -41,7 +41,7 @@ const EAST: &str = "EAST = { u = [1.0] }";
 const MISTAKES: &[Mistake] = &[
     // Not TOML, or not this format.
     row("corridor-blind", "discount = 0.75", "discount 0.75", "0.75", "expected", "TOML"),
-    row("corridor-blind", "name = \"corridor\"", "name = \"corridor-blind", "\nabout", "invalid", "TOML"),
+    row("corridor-blind", "name = \"corridor-blind\"", "name = \"corridor-blind", "\nabout", "invalid", "TOML"),
     row("corridor-blind", "format = 1", "format = 2", "2", "format 2", "reads format 1"),
     row("corridor-blind", "format = 1", "", "#:schema", "`format` is missing", "add `format`"),
     row("corridor-blind", "format = 1", "format = \"1\"", "\"1\"", "string \"1\"", "whole number"),
@@ -121,11 +121,11 @@ const MISTAKES: &[Mistake] = &[
     row("maze-2d", "names = [\"x\", \"y\"]", "names = [\"x\", \"x\"]", "\"x\"] ", "two state variables are called `x`", "rename"),
     row("load-unload", "\"empty\", \"loaded\"]", "\"empty\", \"empty\"]", "\"empty\"]", "two modes are called `empty`", "rename"),
     row("corridor-blind", "names = [\"x\"]", "names = []", "[]\n", "no state variable", "name at least one"),
-    row("corridor-blind", "name = \"corridor\"", "name = \"\"", "\"\"\n", "no name", "short name"),
+    row("corridor-blind", "name = \"corridor-blind\"", "name = \"\"", "\"\"\n", "no name", "short name"),
     row("tiger", "[actions]\nLISTEN = {}\nOPEN-LEFT = { then = \"end\" }\nOPEN-RIGHT = { then = \"end\" }", "[actions]", "[actions]", "no action", "STOP"),
     row("tiger", "then = \"end\"", "then = \"ends\"", "\"ends\"", "unknown value `ends`", "`end`"),
     // Names that a terminal would obey, or that are not what they look like.
-    row("corridor-blind", "name = \"corridor\"", "name = \"corri\\u001b[31mdor\"", "\"corri", "the character \\u{1b}", "can be seen"),
+    row("corridor-blind", "name = \"corridor-blind\"", "name = \"corri\\u001b[31mdor\"", "\"corri", "the character \\u{1b}", "can be seen"),
     row("corridor-blind", "about = \"", "about = \"\\u009b2J", "\"\\u009b", "a text with the character \\u{9b}", "can be seen"),
     row("corridor-blind", "names = [\"x\"]", "names = [\"x\\u0007\"]", "\"x\\u0007", "the character \\u{7}", "can be seen"),
     row("corridor-blind", EAST, "\"EA\\nST\" = { u = [1.0] }", "\"EA", "the character \\u{a}", "can be seen"),

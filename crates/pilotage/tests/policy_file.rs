@@ -25,7 +25,7 @@ fn a_policy_of_another_problem_is_refused() {
     };
     let foreign = refused(&built_in("tiger"));
     assert!(
-        foreign.contains("policy.json") && foreign.contains("for corridor, not for tiger"),
+        foreign.contains("policy.json") && foreign.contains("for corridor-blind, not for tiger"),
         "{foreign}"
     );
     let mut changed = corridor.clone();
