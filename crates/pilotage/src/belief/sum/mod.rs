@@ -182,6 +182,15 @@ fn posterior_rule(r: usize) -> Rule {
     }
 }
 
+/// The same for a sum that is as coarse as the moments of a belief.
+fn coarse_rule(r: usize) -> Rule {
+    match r {
+        2 => Rule::product(2, 4),
+        3 => Rule::product(3, 3),
+        _ => posterior_rule(r),
+    }
+}
+
 /// The whole numbers that a start may be, each a point.
 fn points(start: &Component, shape: StartShape) -> Vec<Component> {
     let (mean, variance) = (start.mean[0], start.covariance[0].max(0.0));
@@ -250,6 +259,7 @@ impl Keeping for SumKeeping {
         Some(Self {
             most: self.most.min(COARSE * self.dynamics.modes()),
             splits: false,
+            posterior: (1..=self.dynamics.states()).map(coarse_rule).collect(),
             ..Self::new(&self.model)
         })
     }

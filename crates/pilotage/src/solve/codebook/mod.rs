@@ -63,12 +63,12 @@ pub struct CodebookPlanner {
 impl Default for CodebookPlanner {
     fn default() -> Self {
         Self {
-            strata: 60,
+            strata: 30,
             apart: 0.12,
             points: None,
-            readings: 40,
-            rounds: 3,
-            episodes: 400,
+            readings: 16,
+            rounds: 2,
+            episodes: 200,
             refined: 3000,
             tolerance: 1e-6,
         }

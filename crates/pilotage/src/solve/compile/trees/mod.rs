@@ -6,7 +6,7 @@
 //!    A. Solar-Lezama, 2018).
 //! 2. **Improve.** The policy sees more of a belief than a tree can ask, so what it expects is not what the tree will earn. The tree is run again,
 //!    and from the beliefs it meets each action is tried once before the tree goes on ([`deviation`]). The next tree is grown on what that
-//!    earned, summed over all rounds (Y. Abbasi-Yadkori and others, "POLITEX", 2019).
+//!    earned, summed over the last rounds (as Y. Abbasi-Yadkori and others do over all, "POLITEX", 2019), as long as that helps.
 //! 3. **Choose.** Trees of many sizes are run in the same episodes, and the smallest is taken that earns hardly less than the best.
 
 mod collected;
@@ -15,12 +15,15 @@ mod shape;
 #[cfg(test)]
 mod tests;
 
+use std::collections::VecDeque;
+
 use crate::belief::BeliefSpace;
+use crate::model::TrackerKind;
 use crate::policy::{
     Automaton, AutomatonRunner, Branch, Matching, Node, Place, Policy, Test, Tree,
 };
 use crate::solve::deviation::{self, Budget};
-use crate::solve::rollout;
+use crate::solve::rollout::{self, Judged};
 use collected::Collected;
 use growth::Growth;
 use shape::{Shape, Spot};
@@ -37,8 +40,12 @@ pub(super) struct Size {
 /// Rounds in which the policy is imitated.
 const IMITATING: usize = 3;
 
-/// Rounds in which the tree is improved on what it earns.
-const IMPROVING: usize = 3;
+/// Most rounds in which the tree is improved on what it earns, and how many of the last the next tree is grown on.
+const IMPROVING: usize = 12;
+const KEPT: usize = 3;
+
+/// A round that gains no more than this share of what is earned is a quiet one.
+const GAIN: f64 = 2e-3;
 
 /// Beliefs judged in a round of imitation for each episode, where the policy reads them, and where it is asked in full, which takes far
 /// longer.
@@ -51,6 +58,9 @@ const STEPS: f64 = 125.0;
 
 /// Steps for each episode by which a tree is compared.
 const TRIAL_STEPS: f64 = 12.5;
+
+/// So many times fewer episodes are run where beliefs are sums of Gaussians in several variables, which take far longer than others.
+const SLOWER: usize = 5;
 
 /// Trees that may be no better than those before, one after the other, until no larger one is tried.
 const PATIENCE: usize = 4;
@@ -74,7 +84,10 @@ pub(super) fn grow(
         policy,
         space,
         size,
-        episodes,
+        episodes: match space.updater().kind() {
+            TrackerKind::Sum if space.model().state_dim() > 1 => episodes.div_ceil(SLOWER),
+            _ => episodes,
+        },
         seed,
         bare: automaton.clone(),
     };
@@ -105,6 +118,12 @@ struct Tried {
     tree: Automaton,
 }
 
+impl Tried {
+    fn earned(&self) -> f64 {
+        self.returns.iter().sum::<f64>() / self.returns.len() as f64
+    }
+}
+
 /// Trees that were tried, and which of them earns most.
 #[derive(Default)]
 struct Trials {
@@ -115,6 +134,14 @@ struct Trials {
 impl Trials {
     fn best(&self) -> Option<&Tried> {
         self.tried.get(self.best)
+    }
+
+    /// How much more the best earns than in these returns, as a share of it.
+    fn gained(&self, before: &[f64]) -> f64 {
+        self.best().map_or(0.0, |best| {
+            let gain = deviation::gain(&best.returns, before).mean;
+            gain / best.earned().abs().max(f64::MIN_POSITIVE)
+        })
     }
 
     fn add(&mut self, tried: Tried) {
@@ -130,7 +157,7 @@ impl Trials {
     /// The smallest tree that earns hardly less than the best: by at most a share of what that earns.
     fn smallest(&self, loss: f64) -> Option<Automaton> {
         let best = self.best()?;
-        let earned = best.returns.iter().sum::<f64>() / best.returns.len() as f64;
+        let earned = best.earned();
         let lost = |tried: &Tried| -deviation::gain(&tried.returns, &best.returns).mean;
         let enough = |tried: &&Tried| lost(tried) <= loss * earned.abs();
         let order = |a: &Tried, b: &Tried| {
@@ -194,19 +221,30 @@ impl Search<'_> {
         self.size.nodes.min(ENOUGH)
     }
 
-    /// Trees grown on what the best so far earns if it once does something else.
+    /// Trees grown on what the best so far earns if it once does something else, until none is better twice in a row.
     fn improve(&self, trials: &mut Trials) {
         let most = self.times(DEVIATIONS);
         let budget = self.budget(STEPS);
-        let mut collected = Collected::new(self.space, &self.bare);
+        let mut kept: VecDeque<Vec<Judged>> = VecDeque::new();
+        let mut quiet = 0;
         for round in 0..IMPROVING {
             let Some(best) = trials.best() else { return };
+            let earned = best.returns.clone();
             let runner = AutomatonRunner::new(&best.tree);
             let seed = self.seed.wrapping_add((IMITATING + round) as u64);
-            collected.extend(deviation::deviations(
-                self.space, &runner, most, budget, seed,
-            ));
+            let judged = deviation::deviations(self.space, &runner, most, budget, seed);
+            kept.push_back(judged);
+            if kept.len() > KEPT {
+                kept.pop_front();
+            }
+            let mut collected = Collected::new(self.space, &self.bare);
+            collected.extend(kept.iter().flatten().cloned());
             self.try_sizes(&collected, trials);
+            let gained = trials.gained(&earned);
+            quiet = if gained > GAIN { 0 } else { quiet + 1 };
+            if quiet == 2 {
+                return;
+            }
         }
     }
 
