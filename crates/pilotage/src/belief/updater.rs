@@ -105,17 +105,6 @@ impl<K: Keeping> Coded<K> {
         (running, read)
     }
 
-    fn update(
-        &self,
-        running: &mut Running<K::Full>,
-        read: &mut Belief,
-        action: ActionId,
-        reading: Reading<'_>,
-    ) {
-        self.act(running, action);
-        self.sense(running, read, action, reading);
-    }
-
     fn act(&self, running: &mut Running<K::Full>, action: ActionId) -> Acted {
         self.keeping.act(&mut running.full, action, running.step)
     }
@@ -253,17 +242,11 @@ impl Updater {
 
     /// Takes in an action and what was sensed after it. A belief that another kind of updater holds stays as it is.
     pub fn update(&self, held: &mut Held, action: ActionId, reading: Reading<'_>) {
-        let read = &mut held.read;
-        match (self, &mut held.kept) {
-            (Self::Linear(filter), Kept::Linear { scratch }) => {
-                filter.update(read, action, reading, scratch);
-            }
-            (Self::Sum(coded), Kept::Sum(running)) => coded.update(running, read, action, reading),
-            (Self::Cells(coded), Kept::Cells(running)) => {
-                coded.update(running, read, action, reading);
-            }
-            _ => {}
+        if let (Self::Linear(filter), Kept::Linear { scratch }) = (self, &mut held.kept) {
+            return filter.update(&mut held.read, action, reading, scratch);
         }
+        self.act(held, action);
+        self.sense(held, action, reading);
     }
 }
 

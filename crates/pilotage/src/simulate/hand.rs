@@ -3,6 +3,7 @@
 use super::Agent;
 use crate::belief::{Belief, BeliefSpace, Held, Reading, Tracker, Tracking};
 use crate::model::ActionId;
+use crate::policy::{Asked, Feature};
 use crate::scenario::HandRule;
 
 /// Follows a rule of thumb on the belief that a tracker keeps. Standard deviations and probabilities of modes are those of the belief itself
@@ -63,7 +64,7 @@ impl Agent for HandAgent<'_> {
     fn act(&mut self) -> ActionId {
         if let Some(moments) = self.tracker.held().and_then(Held::moments) {
             let n = moments.mean.len();
-            let deviation = |i: usize| moments.covariance[i * (n + 1)].max(0.0).sqrt();
+            let deviation = |i: usize| moments.feature(Feature::Deviation(i));
             let deviations: Vec<f64> = (0..n).map(deviation).collect();
             let weights = match moments.weights.len() {
                 1 => &[][..],

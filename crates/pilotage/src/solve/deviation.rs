@@ -10,7 +10,7 @@ use crate::policy::Policy;
 use crate::random::{Role, stream, uniform};
 use crate::scenario::Scenario;
 use crate::simulate::Estimate;
-use crate::solve::rollout::Judged;
+use crate::solve::rollout::{Judged, discounted_steps, told_in};
 use crate::world::{Observation, ProblemWorld, Streams, World};
 
 /// How much may be run.
@@ -101,6 +101,8 @@ struct Runs<'a> {
     /// By start hypothesis.
     told: Vec<Updater>,
     policy: &'a dyn Policy,
+    /// Share of first decisions from which every action is tried.
+    share: f64,
 }
 
 /// An episode as it goes on.
@@ -128,13 +130,14 @@ impl<'a> Runs<'a> {
             scenario: Scenario::assumed(model),
             told: space.updater().told(space),
             policy,
+            share: EACH / discounted_steps(model, model.episode.length),
         }
     }
 
     fn start(&'a self, draws: &mut Streams) -> Course<'a> {
         let mut world = ProblemWorld::new(&self.scenario);
         world.reset(draws);
-        let updater = &self.told[world.hypothesis().min(self.told.len() - 1)];
+        let updater = told_in(&self.told, &world);
         Course {
             runs: self,
             world,
@@ -154,10 +157,6 @@ impl<'a> Runs<'a> {
 
     /// The beliefs chosen of an episode, and the steps that it took in all. Beliefs count by their discount.
     fn deviating(&'a self, seed: u64, episode: u64) -> (Vec<Judged>, usize) {
-        let discount = self.model.discount;
-        let counted: f64 = (0..self.model.episode.length)
-            .map(|step| discount.powi(step as i32))
-            .sum();
         let mut whims = stream(seed, episode, Role::Exploration);
         let mut draws = Streams::new(seed, episode);
         let mut course = self.start(&mut draws);
@@ -165,7 +164,7 @@ impl<'a> Runs<'a> {
         let (mut judged, mut steps) = (Vec::new(), 0);
         let mut counts = 1.0;
         while course.step < self.model.episode.length {
-            let likely = (EACH / counted * counts).min(1.0);
+            let likely = (self.share * counts).min(1.0);
             let own = self.policy.action_in_full(&course.held);
             if uniform(&mut whims) < likely {
                 // The same draws for every action, and others than those of the episode itself.
@@ -189,7 +188,7 @@ impl<'a> Runs<'a> {
                     counts: counts / likely,
                 });
             }
-            counts *= discount;
+            counts *= self.model.discount;
             if !course.take(own, &mut draws).goes_on {
                 break;
             }

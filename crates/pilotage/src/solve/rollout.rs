@@ -71,7 +71,7 @@ pub(crate) fn recorded<At: Send>(
         let mut world = ProblemWorld::new(&scenario);
         world.reset(&mut Streams::new(seed, episode as u64));
         let mut agent = Recorder {
-            inner: TrackingAgent::new(&told[world.hypothesis().min(told.len() - 1)], policy),
+            inner: TrackingAgent::new(told_in(&told, &world), policy),
             at,
             sensed: Vec::new(),
             decisions: Vec::new(),
@@ -79,6 +79,17 @@ pub(crate) fn recorded<At: Send>(
         follow(model, &mut world, &mut agent, length, (seed, episode));
         agent.decisions
     })
+}
+
+/// The one that starts as a world does, of those of [`Updater::told`].
+pub(crate) fn told_in<'a>(told: &'a [Updater], world: &ProblemWorld) -> &'a Updater {
+    &told[world.hypothesis().min(told.len() - 1)]
+}
+
+/// Steps of an episode that is never over early, each counted by its discount.
+pub(crate) fn discounted_steps(model: &Model, length: usize) -> f64 {
+    let counts = (0..length).map(|step| model.discount.powi(step as i32));
+    counts.sum()
 }
 
 /// Runs an episode that is told by a seed and its number.
@@ -126,15 +137,12 @@ pub fn judged(
     let model = space.model();
     let scenario = Scenario::assumed(model);
     let told = space.updater().told(space);
-    let counted: f64 = (0..length)
-        .map(|step| model.discount.powi(step as i32))
-        .sum();
-    let share = most as f64 / (episodes as f64 * counted);
+    let share = most as f64 / (episodes as f64 * discounted_steps(model, length));
     let runs = parallel::map(episodes, |episode| {
         let mut world = ProblemWorld::new(&scenario);
         world.reset(&mut Streams::new(seed, episode as u64));
         let mut agent = Judge {
-            inner: TrackingAgent::new(&told[world.hypothesis().min(told.len() - 1)], policy),
+            inner: TrackingAgent::new(told_in(&told, &world), policy),
             judge,
             actions: model.actions.len(),
             share,

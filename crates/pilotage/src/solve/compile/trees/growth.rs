@@ -39,9 +39,8 @@ pub(super) struct Growth<'a> {
 }
 
 impl<'a> Growth<'a> {
-    /// A tree of one leaf.
-    pub(super) fn new(collected: &'a Collected) -> Self {
-        let members = collected.all();
+    /// A tree of one leaf, to which all beliefs come.
+    pub(super) fn new(collected: &'a Collected, members: Members) -> Self {
         let first = members.first().map_or(&[][..], Vec::as_slice);
         let shape = Shape::leaf(cheapest(&collected.sums(first)));
         let mut growth = Self {

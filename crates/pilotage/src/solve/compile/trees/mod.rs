@@ -24,7 +24,7 @@ use crate::policy::{
 };
 use crate::solve::deviation::{self, Budget};
 use crate::solve::rollout::{self, Judged};
-use collected::Collected;
+use collected::{Collected, Members};
 use growth::Growth;
 use shape::{Shape, Spot};
 
@@ -210,7 +210,9 @@ impl Search<'_> {
                 most,
                 seed,
             ));
-            tree = Some(self.of_size(&collected, &mut Growth::new(&collected), self.imitated()));
+            let all = collected.all();
+            let mut growth = Growth::new(&collected, all.clone());
+            tree = Some(self.of_size((&collected, &all), &mut growth, self.imitated()));
         }
         self.try_sizes(&collected, trials);
     }
@@ -250,11 +252,12 @@ impl Search<'_> {
 
     /// Tries trees of many sizes, as far as larger ones earn more.
     fn try_sizes(&self, collected: &Collected, trials: &mut Trials) {
-        let mut growth = Growth::new(collected);
+        let all = collected.all();
+        let mut growth = Growth::new(collected, all.clone());
         let first = trials.tried.len();
         let (mut best, mut since) = (first, 0);
         for nodes in sizes(self.size.nodes) {
-            let tree = self.of_size(collected, &mut growth, nodes);
+            let tree = self.of_size((collected, &all), &mut growth, nodes);
             since += 1;
             let known = trials.tried[first..].iter();
             if !known
@@ -284,11 +287,15 @@ impl Search<'_> {
     }
 
     /// A tree of at most so many nodes: grown larger, made better, and cut back.
-    fn of_size(&self, collected: &Collected, growth: &mut Growth<'_>, nodes: usize) -> Automaton {
-        let all = collected.all();
+    fn of_size(
+        &self,
+        (collected, all): (&Collected, &Members),
+        growth: &mut Growth<'_>,
+        nodes: usize,
+    ) -> Automaton {
         let mut shape = growth.to(larger(nodes)).clone();
-        shape.refine(collected, &all);
-        shape.cut_back(collected, &all, nodes);
+        shape.refine(collected, all);
+        shape.cut_back(collected, all, nodes);
         let mut tree = self.bare.clone();
         write(&shape, collected, &mut tree);
         tree

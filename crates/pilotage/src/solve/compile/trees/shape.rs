@@ -52,11 +52,11 @@ impl Shape {
         }
     }
 
-    /// The action for a belief that comes to a spot.
-    fn action(&self, collected: &Collected, mut spot: usize, member: u32) -> ActionId {
+    /// The leaf of a belief that comes to a spot, and what is done there.
+    fn end(&self, collected: &Collected, mut spot: usize, member: u32) -> (usize, ActionId) {
         loop {
             match self.spots[spot] {
-                Spot::Leaf(action) => return action,
+                Spot::Leaf(action) => return (spot, action),
                 Spot::Test(cut, ends) => {
                     let value = collected.columns[cut.feature][member as usize];
                     spot = ends[usize::from(value >= cut.less_than)];
@@ -67,7 +67,7 @@ impl Shape {
 
     /// What a belief costs that comes to a spot.
     fn cost_of(&self, collected: &Collected, spot: usize, member: u32) -> f64 {
-        collected.costs_of(member)[self.action(collected, spot, member)]
+        collected.costs_of(member)[self.end(collected, spot, member).1]
     }
 
     /// What all beliefs cost.
@@ -214,12 +214,7 @@ impl Shape {
     pub(super) fn members(&self, collected: &Collected) -> Vec<Vec<u32>> {
         let mut members = vec![Vec::new(); self.spots.len()];
         for member in 0..collected.beliefs.len() as u32 {
-            let mut spot = 0;
-            while let Spot::Test(cut, ends) = self.spots[spot] {
-                let value = collected.columns[cut.feature][member as usize];
-                spot = ends[usize::from(value >= cut.less_than)];
-            }
-            members[spot].push(member);
+            members[self.end(collected, 0, member).0].push(member);
         }
         members
     }

@@ -42,7 +42,7 @@ fn ruled(first: impl Fn(f64, f64) -> bool) -> Collected {
 #[test]
 fn two_questions_are_found_of_which_neither_helps_alone() {
     let collected = ruled(|x, y| (x < 0.2) != (y < -0.3));
-    let mut shape = Growth::new(&collected).to(4).clone();
+    let mut shape = Growth::new(&collected, collected.all()).to(4).clone();
     shape.refine(&collected, &collected.all());
     assert_eq!(shape.cost(&collected), 0.0);
     assert_eq!(shape.leaves(0), 4);
@@ -51,7 +51,7 @@ fn two_questions_are_found_of_which_neither_helps_alone() {
 #[test]
 fn a_rule_is_found_to_its_borders_and_cut_back_to_as_many_leaves_as_it_has() {
     let collected = ruled(|x, y| x < 0.4 && y < 0.7 && y > -0.5);
-    let mut shape = Growth::new(&collected).to(12).clone();
+    let mut shape = Growth::new(&collected, collected.all()).to(12).clone();
     shape.refine(&collected, &collected.all());
     shape.cut_back(&collected, &collected.all(), 12);
     assert_eq!((shape.cost(&collected), shape.leaves(0)), (0.0, 4));
@@ -81,7 +81,7 @@ proptest! {
         let beliefs = beliefs.into_iter().map(|((x, y), (a, b))| ([x, y], [a, b]));
         let collected = collected(beliefs);
         let all = collected.all();
-        let mut growth = Growth::new(&collected);
+        let mut growth = Growth::new(&collected, collected.all());
         let alone = growth.to(1).cost(&collected);
         let mut shape: Shape = growth.to(leaves + 6).clone();
         prop_assert!(shape.leaves(0) <= leaves + 6);
