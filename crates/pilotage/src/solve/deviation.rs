@@ -71,14 +71,21 @@ pub(crate) fn returns(
     let mut taken = 0;
     let worse = |returns: &[f64]| other.is_some_and(|other| plainly_worse(returns, other));
     while returns.len() < budget.episodes || (taken < budget.steps && !worse(&returns)) {
-        let first = returns.len();
-        let together = parallel::map(TOGETHER, |i| runs.plain(seed, (first + i) as u64));
-        for (earned, steps) in together {
-            returns.push(earned);
-            taken += steps;
-        }
+        taken += runs.go_on(seed, TOGETHER, &mut returns);
     }
     returns
+}
+
+/// Goes on to so many episodes where returns in the first of them are known.
+pub(crate) fn more_returns(
+    space: &dyn BeliefSpace,
+    policy: &dyn Policy,
+    episodes: usize,
+    seed: u64,
+    returns: &mut Vec<f64>,
+) {
+    let missing = episodes.saturating_sub(returns.len());
+    Runs::new(space, policy).go_on(seed, missing, returns);
 }
 
 /// How much more is earned than by another, in the episodes that both have.
@@ -146,6 +153,16 @@ impl<'a> Runs<'a> {
             observation: Observation::new(self.model.observation_dim()),
             step: 0,
         }
+    }
+
+    /// Adds the returns of so many episodes after those known, and says how many steps they took.
+    fn go_on(&'a self, seed: u64, episodes: usize, returns: &mut Vec<f64>) -> usize {
+        let first = returns.len();
+        let run = |i| self.plain(seed, (first + i) as u64);
+        let (earned, steps): (Vec<f64>, Vec<usize>) =
+            parallel::map(episodes, run).into_iter().unzip();
+        returns.extend(earned);
+        steps.iter().sum()
     }
 
     fn plain(&'a self, seed: u64, episode: u64) -> (f64, usize) {

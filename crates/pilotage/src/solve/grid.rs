@@ -209,6 +209,16 @@ impl Grid {
         &self.axes
     }
 
+    /// Whether a place is on it.
+    pub(crate) fn contains(&self, at: &[f64]) -> bool {
+        let sides = self.axes.iter().zip(at);
+        sides.into_iter().all(|(axis, x)| {
+            let (low, high) = (axis.at(0), axis.at(axis.count - 1));
+            let slack = 1e-9 * (high - low);
+            (low - slack..=high + slack).contains(x)
+        })
+    }
+
     /// Coordinates of a point.
     pub(crate) fn point(&self, index: usize) -> Vec<f64> {
         self.axes

@@ -1,6 +1,8 @@
 //! Posterior moments by a quadrature that is moved to where the posterior is (J. Naylor and A. Smith, 1982).
 
-use super::frame::{Frame, Inner, root_into};
+use smallvec::smallvec;
+
+use super::frame::{Few, Frame, Inner, root_into};
 use super::quadrature::Rule;
 use super::sensor::Sensor;
 
@@ -24,49 +26,58 @@ pub(super) struct Adapted {
     pub(super) settled: bool,
 }
 
+/// Room for what is found on the way.
+#[derive(Default)]
+pub(super) struct Room {
+    places: Vec<f64>,
+    weights: Vec<f64>,
+}
+
 /// Finds the posterior of a standard normal in the coordinates of a frame, from a guess that it takes the place of.
 pub(super) fn adapt(
     sensor: &mut Sensor<'_>,
     frame: &Frame,
     rule: &Rule,
     found: &mut Inner,
+    room: &mut Room,
 ) -> Adapted {
     let r = frame.rank;
-    let mut at = vec![0.0; frame.dim()];
-    let mut spread = vec![0.0; r * r];
-    let mut places = vec![0.0; rule.weights.len() * r];
-    let mut weights = vec![0.0; rule.weights.len()];
+    let mut at: Few = smallvec![0.0; frame.dim()];
+    let mut spread: Few = smallvec![0.0; r * r];
+    let Room { places, weights } = room;
+    places.resize(rule.weights.len() * r, 0.0);
+    weights.resize(rule.weights.len(), 0.0);
     let mut log = f64::NEG_INFINITY;
     for _ in 0..ROUNDS {
         let wide = |k: usize| WIDER * found.covariance[k];
-        let wide: Vec<f64> = (0..r * r).map(wide).collect();
+        let wide: Few = (0..r * r).map(wide).collect();
         root_into(&wide, r, &mut spread);
-        let volume: f64 = (0..r).map(|i| spread[i * r + i].ln()).sum();
+        let volume = (0..r).map(|i| spread[i * r + i]).product::<f64>().ln();
         if !volume.is_finite() {
             break;
         }
-        let points = places.chunks_exact_mut(r).zip(&mut weights);
-        for ((place, weight), (node, share)) in points.zip(rule.iter()) {
+        let points = places.chunks_exact_mut(r).zip(weights.iter_mut());
+        for ((place, weight), (node, share)) in points.zip(rule.over_density()) {
             let mut squares = 0.0;
             for i in 0..r {
                 let along: f64 = (0..=i).map(|k| spread[i * r + k] * node[k]).sum();
                 place[i] = found.mean[i] + along;
-                squares += node[i] * node[i] - place[i] * place[i];
+                squares += place[i] * place[i];
             }
             frame.place(place, &mut at);
-            *weight = sensor.log_likelihood(&at) + 0.5 * squares + share.ln();
+            *weight = sensor.log_likelihood(&at) - 0.5 * squares + share;
         }
         let best = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
             break;
         }
         let mut total = 0.0;
-        for weight in &mut weights {
+        for weight in weights.iter_mut() {
             *weight = (*weight - best).exp();
             total += *weight;
         }
         log = best + total.ln() + volume;
-        if gather(&places, &weights, total, found) < SETTLED {
+        if gather(places, weights, total, found) < SETTLED {
             return Adapted { log, settled: true };
         }
     }
@@ -80,13 +91,13 @@ pub(super) fn adapt(
 fn gather(places: &[f64], weights: &[f64], total: f64, found: &mut Inner) -> f64 {
     let r = found.mean.len();
     let mut change: f64 = 0.0;
-    let mut mean = vec![0.0; r];
+    let mut mean: Few = smallvec![0.0; r];
     for (place, weight) in places.chunks_exact(r).zip(weights) {
         for (sum, x) in mean.iter_mut().zip(place) {
             *sum += weight / total * x;
         }
     }
-    let mut covariance = vec![0.0; r * r];
+    let mut covariance: Few = smallvec![0.0; r * r];
     for (place, weight) in places.chunks_exact(r).zip(weights) {
         for i in 0..r {
             for j in 0..=i {

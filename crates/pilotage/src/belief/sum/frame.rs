@@ -1,12 +1,17 @@
 //! A Gaussian seen from within: its own standard normal coordinates, of which a singular one has fewer than there are variables.
 
+use smallvec::{SmallVec, smallvec};
+
 use super::component::Component;
+
+/// Numbers of a Gaussian in few variables, which need no room elsewhere.
+pub(super) type Few = SmallVec<[f64; 9]>;
 
 /// `x = mean + root z` with `z` of length `r`, standard normal.
 pub(super) struct Frame {
-    mean: Vec<f64>,
+    mean: Few,
     /// `n x r`, row by row.
-    root: Vec<f64>,
+    root: Few,
     /// Number of directions in which there is any variance, `r`.
     pub(super) rank: usize,
 }
@@ -15,9 +20,9 @@ pub(super) struct Frame {
 #[derive(Clone)]
 pub(super) struct Inner {
     /// Length `r`.
-    pub(super) mean: Vec<f64>,
+    pub(super) mean: Few,
     /// `r x r`, row by row.
-    pub(super) covariance: Vec<f64>,
+    pub(super) covariance: Few,
 }
 
 impl Inner {
@@ -25,7 +30,7 @@ impl Inner {
     pub(super) fn standard(r: usize) -> Self {
         let one = |k: usize| f64::from(k.is_multiple_of(r + 1));
         Self {
-            mean: vec![0.0; r],
+            mean: smallvec![0.0; r],
             covariance: (0..r * r).map(one).collect(),
         }
     }
@@ -35,7 +40,7 @@ impl Frame {
     pub(super) fn new(component: &Component) -> Self {
         let n = component.dim();
         let whole = root(&component.covariance, n);
-        let kept: Vec<usize> = (0..n).filter(|&j| whole[j * n + j] > 0.0).collect();
+        let kept: SmallVec<[usize; 3]> = (0..n).filter(|&j| whole[j * n + j] > 0.0).collect();
         let rank = kept.len();
         let root = match rank == n {
             true => whole,
@@ -44,7 +49,7 @@ impl Frame {
                 .collect(),
         };
         Self {
-            mean: component.mean.clone(),
+            mean: Few::from_slice(&component.mean),
             root,
             rank,
         }
@@ -89,8 +94,8 @@ impl Frame {
 }
 
 /// Lower triangular root of a covariance, row by row; 0 along directions without any variance.
-pub(super) fn root(covariance: &[f64], n: usize) -> Vec<f64> {
-    let mut root = vec![0.0; n * n];
+pub(super) fn root(covariance: &[f64], n: usize) -> Few {
+    let mut root: Few = smallvec![0.0; n * n];
     root_into(covariance, n, &mut root);
     root
 }
@@ -127,19 +132,27 @@ pub(super) fn place(mean: &[f64], root: &[f64], z: &[f64], to: &mut [f64]) {
 /// variance are left out.
 pub(super) fn whiten(root: &[f64], x: &mut [f64]) -> f64 {
     let n = x.len();
-    let mut log = 0.0;
+    let (mut log, mut volume) = (0.0, 1.0_f64);
     for i in 0..n {
         let before: f64 = (0..i).map(|k| root[i * n + k] * x[k]).sum();
         let pivot = root[i * n + i];
         if pivot > 0.0 {
             x[i] = (x[i] - before) / pivot;
-            log -= pivot.ln() + 0.5 * (LOG_TAU + x[i] * x[i]);
+            log -= 0.5 * (LOG_TAU + x[i] * x[i]);
+            volume *= pivot;
+            if !FAR.contains(&volume) {
+                log -= volume.ln();
+                volume = 1.0;
+            }
         } else {
             x[i] = 0.0;
         }
     }
-    log
+    log - volume.ln()
 }
+
+/// Volumes of which the logarithm need not be taken yet: one for all pivots is faster than one for each.
+const FAR: std::ops::Range<f64> = 1e-100..1e100;
 
 /// `ln 2 pi`.
 pub(super) const LOG_TAU: f64 = 1.837_877_066_409_345_3;

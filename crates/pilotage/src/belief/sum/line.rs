@@ -1,5 +1,7 @@
 //! The posterior of a Gaussian along a line, whatever it looks like: panels are halved where what they hold is not yet known.
 
+use smallvec::smallvec;
+
 use super::frame::{Frame, Inner};
 use super::sensor::Sensor;
 
@@ -179,8 +181,8 @@ fn gathered(panels: &[Panel], whole: f64, most: usize) -> Vec<(f64, Inner)> {
     }
     let inner = |(weight, mean, variance)| {
         let inner = Inner {
-            mean: vec![mean],
-            covariance: vec![variance],
+            mean: smallvec![mean],
+            covariance: smallvec![variance],
         };
         (weight, inner)
     };

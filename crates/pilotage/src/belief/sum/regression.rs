@@ -2,7 +2,9 @@
 //! iterated posterior linearisation filter: A. Garcia-Fernandez, L. Svensson, M. Morelande and S. Sarkka, 2015). Once is the update of
 //! S. Julier and J. Uhlmann (1997), exact for linear sensors.
 
-use super::frame::{Frame, Inner, root, root_into, whiten};
+use smallvec::smallvec;
+
+use super::frame::{Few, Frame, Inner, root, root_into, whiten};
 use super::sensor::Sensor;
 
 /// Noise of no variance is taken for this share of the spread of what is read.
@@ -14,9 +16,9 @@ const SETTLED: f64 = 1e-3;
 /// What is read, as a linear function of the coordinates of a frame: `A z + b`, with noise of covariance `noise`.
 struct Line {
     /// `m x r`, row by row.
-    a: Vec<f64>,
-    b: Vec<f64>,
-    noise: Vec<f64>,
+    a: Few,
+    b: Few,
+    noise: Few,
 }
 
 /// The posterior of a standard normal in the coordinates of a frame after at most so many rounds, and the logarithm of the density of
@@ -57,10 +59,10 @@ impl Line {
         }
         let far = (r as f64).sqrt();
         let share = 0.5 / r as f64;
-        let (mut z, mut at) = (vec![0.0; r], vec![0.0; frame.dim()]);
-        let mut values = vec![0.0; 2 * r * m];
-        let mut noise = vec![0.0; m * m];
-        let mut expected = vec![0.0; m];
+        let (mut z, mut at): (Few, Few) = (smallvec![0.0; r], smallvec![0.0; frame.dim()]);
+        let mut values: Few = smallvec![0.0; 2 * r * m];
+        let mut noise: Few = smallvec![0.0; m * m];
+        let mut expected: Few = smallvec![0.0; m];
         for (k, value) in values.chunks_exact_mut(m).enumerate() {
             let step = if k % 2 == 0 { far } else { -far };
             for (i, z) in z.iter_mut().enumerate() {
@@ -77,7 +79,7 @@ impl Line {
             }
         }
         // How readings go with the whitened coordinates of `around`, and what of their spread that leaves over.
-        let mut a = vec![0.0; m * r];
+        let mut a: Few = smallvec![0.0; m * r];
         for i in 0..r {
             let (plus, minus) = (2 * i * m, (2 * i + 1) * m);
             for q in 0..m {
@@ -123,12 +125,12 @@ impl Line {
         for q in 0..m {
             innovation[q * m + q] += (SHARP * scale).max(f64::MIN_POSITIVE);
         }
-        let mut spread = vec![0.0; m * m];
+        let mut spread: Few = smallvec![0.0; m * m];
         root_into(&innovation, m, &mut spread);
-        let mut apart: Vec<f64> = read.iter().zip(&self.b).map(|(o, b)| o - b).collect();
+        let mut apart: Few = read.iter().zip(&self.b).map(|(o, b)| o - b).collect();
         let log = whiten(&spread, &mut apart);
         // Row by row, the gain is `A' S^-1`; whitened once here, twice below.
-        let mut gain = vec![0.0; r * m];
+        let mut gain: Few = smallvec![0.0; r * m];
         for (i, row) in gain.chunks_exact_mut(m).enumerate() {
             for (q, value) in row.iter_mut().enumerate() {
                 *value = a(q, i);
@@ -137,7 +139,7 @@ impl Line {
         }
         let mean = gain.chunks_exact(m);
         let mean = mean.map(|row| row.iter().zip(&apart).map(|(g, x)| g * x).sum());
-        let mean: Vec<f64> = mean.collect();
+        let mean: Few = mean.collect();
         for row in gain.chunks_exact_mut(m) {
             for q in (0..m).rev() {
                 let later: f64 = (q + 1..m).map(|p| spread[p * m + q] * row[p]).sum();
@@ -159,16 +161,16 @@ impl Line {
     }
 
     /// `(I - K A)(I - K A)' + K R K'`, which keeps its digits where hardly anything is left (P. Joseph).
-    fn joseph(&self, gain: &[f64], r: usize) -> Vec<f64> {
+    fn joseph(&self, gain: &[f64], r: usize) -> Few {
         let m = self.b.len();
-        let mut left = vec![0.0; r * r];
+        let mut left: Few = smallvec![0.0; r * r];
         for i in 0..r {
             for j in 0..r {
                 let known: f64 = (0..m).map(|q| gain[i * m + q] * self.a[q * r + j]).sum();
                 left[i * r + j] = if i == j { 1.0 - known } else { -known };
             }
         }
-        let mut covariance = vec![0.0; r * r];
+        let mut covariance: Few = smallvec![0.0; r * r];
         for i in 0..r {
             for j in 0..=i {
                 let mut sum: f64 = (0..r).map(|k| left[i * r + k] * left[j * r + k]).sum();

@@ -4,7 +4,7 @@
 //! looked at: along a line by panels, which also cut it into pieces that are Gaussian enough, in a plane by a quadrature that is moved to
 //! where it is. A Gaussian in the plane that is too wide for its sensor is split before.
 
-use super::adapt::adapt;
+use super::adapt::{Room, adapt};
 use super::bend::Bend;
 use super::component::Component;
 use super::frame::{Frame, Inner};
@@ -17,6 +17,9 @@ use crate::model::{ActionId, VariableKind};
 
 /// Times that the line is laid anew through what is read.
 const ROUNDS: usize = 4;
+
+/// The same where points are moved from there to the posterior.
+const GUESSING: usize = 2;
 
 /// Times that a Gaussian is split for a reading.
 const DEPTH: usize = 3;
@@ -37,8 +40,9 @@ struct Passing {
     logs: Vec<f64>,
     /// The best of these.
     best: f64,
-    /// Room for a state.
+    /// Room for a state, and for points of a quadrature.
     at: Vec<f64>,
+    points: Room,
     /// Parts up to which Gaussians are split.
     room: usize,
     /// Pieces that a Gaussian on a line may become.
@@ -69,6 +73,7 @@ impl SumKeeping {
             logs: Vec::with_capacity(count),
             best: f64::NEG_INFINITY,
             at: vec![0.0; self.dynamics.states()],
+            points: Room::default(),
             room: if self.splits {
                 3 * self.most.max(count)
             } else {
@@ -154,7 +159,8 @@ impl SumKeeping {
             }
             return;
         }
-        let (guess, log) = regress(sensor, &frame, read, ROUNDS);
+        let rounds = if frame.rank == 1 { ROUNDS } else { GUESSING };
+        let (guess, log) = regress(sensor, &frame, read, rounds);
         if weight + log < passing.best - HOPELESS {
             return;
         }
@@ -179,7 +185,7 @@ impl SumKeeping {
             return self.cut_up(part, sensor, frame, &guess, passing);
         }
         let mut found = guess.clone();
-        let adapted = adapt(sensor, frame, rule, &mut found);
+        let adapted = adapt(sensor, frame, rule, &mut found, &mut passing.points);
         if frame.rank == 1 && !adapted.settled {
             return self.cut_up(part, sensor, frame, &guess, passing);
         }

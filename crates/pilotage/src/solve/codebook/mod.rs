@@ -8,7 +8,7 @@
 //!    that they lie between and the points of the grid around their mean. Where beliefs in full were met, they take the place of what
 //!    the codebook makes of them.
 //! 3. Value iteration on these sparse rows.
-//! 4. The greedy policy is run, with some actions at random; the beliefs it meets go back to 1.
+//! 4. The greedy policy is run, with some actions at random; the beliefs it meets go back to 1, where strata of them join the others.
 //!
 //! The round that earns most in the world that the model assumes is kept.
 
@@ -63,13 +63,13 @@ pub struct CodebookPlanner {
 impl Default for CodebookPlanner {
     fn default() -> Self {
         Self {
-            strata: 30,
+            strata: 40,
             apart: 0.12,
             points: None,
-            readings: 16,
+            readings: 9,
             rounds: 2,
             episodes: 200,
-            refined: 3000,
+            refined: 1000,
             tolerance: 1e-6,
         }
     }
@@ -159,16 +159,22 @@ impl CodebookPlanner {
         let mut codebook = Codebook::new(model);
         let mut met = meet(model, keeping.as_ref(), None, self.episodes, seed);
         let mut best: Option<Round> = None;
+        let mut earlier: Option<Rows> = None;
         for round in 0..self.rounds {
             observer.progress("rounds", round as u64, self.rounds as u64);
             let moments: Vec<Moments> = met.iter().map(|met| met.moments.clone()).collect();
-            codebook.cover(&moments, self.apart, self.strata);
-            let grid = self.grid(model, &moments);
+            codebook.cover(&moments, self.apart, self.strata_of(round));
+            let reaches = |rows: &Rows| moments.iter().all(|met| rows.grid.contains(&met.mean));
+            earlier = earlier.filter(reaches);
+            let known = earlier.as_ref().map(|rows| rows.grid.clone());
+            let grid = known.unwrap_or_else(|| self.grid(model, &moments));
             let ways = (keeping.as_ref(), coarse.as_ref().unwrap_or(&keeping));
-            let rows = Rows::new(ways, &codebook, grid, &met, self);
+            let rows = Rows::new(ways, &codebook, grid, &met, self, earlier.take());
             let found = rows.solve(model.discount, self.tolerance);
             let planned = rows.worth(keeping.as_ref(), &codebook, &found, model.discount, self);
-            let values = GridValues::new(rows.grid, found, codebook.len(), model.actions.len());
+            let grid = rows.grid.clone();
+            let values = GridValues::new(grid, found, codebook.len(), model.actions.len());
+            earlier = Some(rows);
             let shared = Arc::new(codebook.clone());
             let updater = updater(Coded::new(model, Arc::clone(&keeping), Arc::clone(&shared)));
             let options = Options {
@@ -217,6 +223,15 @@ impl CodebookPlanner {
                 space: Box::new(space),
             })
         })
+    }
+
+    /// Most strata of a round: three quarters of all in the first, so that later ones find room for strata of what they have met.
+    fn strata_of(&self, round: usize) -> usize {
+        let later = self.strata / 4;
+        match self.rounds {
+            1 => self.strata,
+            rounds => self.strata - later + (later * round).div_ceil(rounds - 1),
+        }
     }
 
     /// Points of means that cover those that were met.

@@ -1,6 +1,6 @@
 //! The decision process on strata and a grid of means, as sparse rows.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::CodebookPlanner;
 use super::meet::Met;
@@ -23,6 +23,8 @@ pub(super) struct Rows {
     actions: usize,
     /// Where an episode starts: states with weights.
     start: Vec<(u32, f64)>,
+    /// States whose rows are of beliefs that were met.
+    refined: BTreeSet<usize>,
 }
 
 /// Most beliefs in full that one state is refined on.
@@ -106,13 +108,15 @@ fn averaged(rows: &[Row]) -> Row {
 }
 
 impl Rows {
-    /// The rows of a codebook, refined on beliefs that were met.
+    /// The rows of a codebook, refined on beliefs that were met. Earlier rows on the same grid are taken over where nothing was or is
+    /// refined: strata stay what they are when others join them.
     pub(super) fn new<K: Keeping>(
         (keeping, coarse): (&K, &K),
         codebook: &Codebook,
         grid: Grid,
         met: &[Met<K::Full>],
         settings: &CodebookPlanner,
+        earlier: Option<Self>,
     ) -> Self {
         let reader = Reader {
             codebook,
@@ -121,7 +125,14 @@ impl Rows {
         let actions = keeping.actions();
         let (points, states) = (grid.len(), codebook.len() * grid.len());
         let refined = refined::<K>(&reader, met, settings.refined);
-        let of_state = |state: usize| -> Vec<Row> {
+        let of_state = |state: usize| -> Option<Vec<Row>> {
+            let known = |earlier: &Self| {
+                let inside = state * actions < earlier.rows.len();
+                inside && !earlier.refined.contains(&state)
+            };
+            if earlier.as_ref().is_some_and(known) && !refined.contains_key(&state) {
+                return None;
+            }
             let mean = grid.point(state % points);
             let (keeping, fulls) = match refined.get(&state) {
                 Some(fulls) => {
@@ -145,17 +156,32 @@ impl Rows {
                     fulls => averaged(&fulls.iter().map(of).collect::<Vec<_>>()),
                 }
             };
-            (0..actions).map(of_action).collect()
+            Some((0..actions).map(of_action).collect())
         };
-        let rows = parallel::map(states, of_state);
+        let found = parallel::map(states, of_state);
+        let mut earlier = earlier
+            .map_or_else(Vec::new, |earlier| earlier.rows)
+            .into_iter();
+        let mut rows = Vec::with_capacity(states * actions);
+        for own in found {
+            let known = earlier.by_ref().take(actions);
+            match own {
+                Some(own) => {
+                    known.for_each(drop);
+                    rows.extend(own);
+                }
+                None => rows.extend(known),
+            }
+        }
         let mut moments = Moments::default();
         keeping.moments(&keeping.start(), &mut moments);
         let mut start = Vec::new();
         reader.states(&moments, &mut Vec::new(), &mut start, 1.0);
         Self {
-            rows: rows.into_iter().flatten().collect(),
+            rows,
             actions,
             start: merged(start),
+            refined: refined.into_keys().collect(),
             grid,
         }
     }

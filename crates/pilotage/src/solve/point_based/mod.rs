@@ -287,6 +287,7 @@ impl Search<'_> {
         let most = self.settings.beliefs;
         let mut rng = self.rng();
         let mut set = self.blind();
+        let blind = set.start;
         let mut met = Met::new(self.backup.start.clone(), self.settings.apart);
         met.collect(&self.walker(None), most.div_ceil(4));
         let mut quiet = 0;
@@ -309,8 +310,8 @@ impl Search<'_> {
                 true => quiet + 1,
                 false => 0,
             };
-            // A round of quiet may be for want of beliefs.
-            if quiet == 2 {
+            // A round of quiet may be for want of beliefs, above all where nothing has been gained at all.
+            if quiet >= 2 && (set.start > blind || met.points.len() == most) {
                 return (met, set, true);
             }
             let share = most.div_ceil(8).max(1);

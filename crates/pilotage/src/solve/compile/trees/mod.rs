@@ -7,7 +7,8 @@
 //! 2. **Improve.** The policy sees more of a belief than a tree can ask, so what it expects is not what the tree will earn. The tree is run again,
 //!    and from the beliefs it meets each action is tried once before the tree goes on ([`deviation`]). The next tree is grown on what that
 //!    earned, summed over the last rounds (as Y. Abbasi-Yadkori and others do over all, "POLITEX", 2019), as long as that helps.
-//! 3. **Choose.** Trees of many sizes are run in the same episodes, and the smallest is taken that earns hardly less than the best.
+//! 3. **Choose.** Trees of many sizes are run in the same episodes; the best go on to ever more of them, half of them at a time (Z. Karnin,
+//!    T. Koren and O. Somekh, 2013), and the smallest is taken that earns hardly less than the one that is left.
 
 mod collected;
 mod growth;
@@ -59,8 +60,11 @@ const STEPS: f64 = 125.0;
 /// Steps for each episode by which a tree is compared.
 const TRIAL_STEPS: f64 = 12.5;
 
+/// Trees that are compared in more episodes once all have been tried. Half of them go on to twice as many, as often as that leaves one.
+const FINALISTS: usize = 8;
+
 /// So many times fewer episodes are run where beliefs are sums of Gaussians in several variables, which take far longer than others.
-const SLOWER: usize = 5;
+const SLOWER: usize = 10;
 
 /// Trees that may be no better than those before, one after the other, until no larger one is tried.
 const PATIENCE: usize = 4;
@@ -97,7 +101,8 @@ pub(super) fn grow(
     if search.judge_knows_values() {
         search.improve(&mut trials);
     }
-    if let Some(chosen) = trials.smallest(size.loss) {
+    search.compare(&mut trials);
+    if let Some(chosen) = search.smallest(&mut trials) {
         *automaton = chosen;
     }
 }
@@ -155,17 +160,31 @@ impl Trials {
     }
 
     /// The smallest tree that earns hardly less than the best: by at most a share of what that earns.
-    fn smallest(&self, loss: f64) -> Option<Automaton> {
+    fn smallest(&self, loss: f64) -> Option<usize> {
         let best = self.best()?;
         let earned = best.earned();
         let lost = |tried: &Tried| -deviation::gain(&tried.returns, &best.returns).mean;
-        let enough = |tried: &&Tried| lost(tried) <= loss * earned.abs();
+        let enough = |&i: &usize| lost(&self.tried[i]) <= loss * earned.abs();
         let order = |a: &Tried, b: &Tried| {
             let nodes = a.tree.nodes.len().cmp(&b.tree.nodes.len());
             nodes.then(lost(a).total_cmp(&lost(b)))
         };
-        let kept = self.tried.iter().filter(enough);
-        Some(kept.min_by(|a, b| order(a, b))?.tree.clone())
+        let kept = (0..self.tried.len()).filter(enough);
+        kept.min_by(|&a, &b| order(&self.tried[a], &self.tried[b]))
+    }
+
+    /// Trees from the one that earns most, against the best, to the one that earns least; so many of them.
+    fn ranked(&self, most: usize) -> Vec<usize> {
+        let Some(best) = self.best() else {
+            return Vec::new();
+        };
+        let gain = |i: &usize| deviation::gain(&self.tried[*i].returns, &best.returns).mean;
+        let mut ranked: Vec<usize> = (0..self.tried.len()).collect();
+        ranked.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+        // Trees that do the same are one.
+        ranked.dedup_by(|a, b| self.tried[*a].returns == self.tried[*b].returns);
+        ranked.truncate(most);
+        ranked
     }
 }
 
@@ -280,10 +299,49 @@ impl Search<'_> {
 
     /// What a tree earns where the model holds, in the same episodes as every other.
     fn returns(&self, tree: &Automaton, trials: &Trials) -> Vec<f64> {
-        let seed = self.seed.wrapping_add((IMITATING + IMPROVING) as u64);
+        let seed = self.trial_seed();
         let other = trials.best().map(|best| best.returns.as_slice());
         let runner = AutomatonRunner::new(tree);
         deviation::returns(self.space, &runner, self.budget(TRIAL_STEPS), seed, other)
+    }
+
+    /// Finds the best of the trees that were tried, in more episodes.
+    fn compare(&self, trials: &mut Trials) {
+        let mut finalists = trials.ranked(FINALISTS);
+        while finalists.len() > 1 {
+            let longest = finalists.iter().map(|&i| trials.tried[i].returns.len());
+            let episodes = 2 * longest.max().unwrap_or(0);
+            for &i in &finalists {
+                self.go_on(&mut trials.tried[i], episodes);
+            }
+            let earned = |i: usize| trials.tried[i].earned();
+            finalists.sort_by(|&a, &b| earned(b).total_cmp(&earned(a)));
+            finalists.truncate(finalists.len().div_ceil(2));
+            trials.best = finalists[0];
+        }
+    }
+
+    /// The smallest tree that earns hardly less than the best, in as many episodes as that.
+    fn smallest(&self, trials: &mut Trials) -> Option<Automaton> {
+        loop {
+            let chosen = trials.smallest(self.size.loss)?;
+            let episodes = trials.best()?.returns.len();
+            let tried = &mut trials.tried[chosen];
+            if tried.returns.len() >= episodes {
+                return Some(tried.tree.clone());
+            }
+            self.go_on(tried, episodes);
+        }
+    }
+
+    fn go_on(&self, tried: &mut Tried, episodes: usize) {
+        let runner = AutomatonRunner::new(&tried.tree);
+        let seed = self.trial_seed();
+        deviation::more_returns(self.space, &runner, episodes, seed, &mut tried.returns);
+    }
+
+    fn trial_seed(&self) -> u64 {
+        self.seed.wrapping_add((IMITATING + IMPROVING) as u64)
     }
 
     /// A tree of at most so many nodes: grown larger, made better, and cut back.
