@@ -175,7 +175,7 @@ impl SumKeeping {
 fn posterior_rule(r: usize) -> Rule {
     match r {
         1 => Rule::product(1, 9),
-        2 => Rule::product(2, 4),
+        2 => Rule::product(2, 5),
         3 => Rule::product(3, 4),
         4 => Rule::product(4, 3),
         _ => Rule::new(r, 0),
