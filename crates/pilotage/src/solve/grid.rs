@@ -211,8 +211,7 @@ impl Grid {
 
     /// Whether a place is on it.
     pub(crate) fn contains(&self, at: &[f64]) -> bool {
-        let sides = self.axes.iter().zip(at);
-        sides.into_iter().all(|(axis, x)| {
+        self.axes.iter().zip(at).all(|(axis, x)| {
             let (low, high) = (axis.at(0), axis.at(axis.count - 1));
             let slack = 1e-9 * (high - low);
             (low - slack..=high + slack).contains(x)

@@ -140,7 +140,7 @@ pub(super) fn whiten(root: &[f64], x: &mut [f64]) -> f64 {
             x[i] = (x[i] - before) / pivot;
             log -= 0.5 * (LOG_TAU + x[i] * x[i]);
             volume *= pivot;
-            if !FAR.contains(&volume) {
+            if !SAFE.contains(&volume) {
                 log -= volume.ln();
                 volume = 1.0;
             }
@@ -152,7 +152,7 @@ pub(super) fn whiten(root: &[f64], x: &mut [f64]) -> f64 {
 }
 
 /// Volumes of which the logarithm need not be taken yet: one for all pivots is faster than one for each.
-const FAR: std::ops::Range<f64> = 1e-100..1e100;
+const SAFE: std::ops::Range<f64> = 1e-100..1e100;
 
 /// `ln 2 pi`.
 pub(super) const LOG_TAU: f64 = 1.837_877_066_409_345_3;
