@@ -12,8 +12,8 @@ use super::levels::{ClassId, LevelGraph, StratumId};
 use super::mixture::Mixture;
 use crate::error::Result;
 use crate::model::{
-    ActionId, Barriers, Effect, EffectTable, HypothesisBelief, Interval, Map, ModeId, Model,
-    Outcome, Region, Then, WallBelief, When, apart,
+    ActionId, Barriers, Effect, EffectTable, HypothesisBelief, Interval, ModeId, Model, Outcome,
+    Region, Then, WallBelief, When, apart,
 };
 
 /// A model together with its uncertainty levels and the way a belief is read.
@@ -89,9 +89,10 @@ impl BeliefMdp {
             (_, WallBelief::Clip) => Reading::Clipped,
             _ => Reading::Gaussian,
         };
-        let read = |effect: Effect| match reading {
-            Reading::Clipped => Some(Effect {
-                region: beyond_walls(model, &effect.region)?,
+        let walls = (model.belief.walls == WallBelief::Clip).then(|| Barriers::new(model));
+        let read = |effect: Effect| match (&walls, reading) {
+            (Some(walls), Reading::Clipped) => Some(Effect {
+                region: walls.reached(&effect.region)?,
                 ..effect
             }),
             _ => Some(effect),
@@ -103,7 +104,7 @@ impl BeliefMdp {
             model: model.clone(),
             levels,
             starts,
-            walls: (model.belief.walls == WallBelief::Clip).then(|| Barriers::new(model)),
+            walls,
             reading,
             mixture,
         }
@@ -228,8 +229,9 @@ impl BeliefMdp {
 
     /// Probability that the true state lies in the region (Eq. 5.2, exact).
     pub fn probability(&self, level: StratumId, mean: &[f64], region: &Region) -> f64 {
-        match self.reading {
-            Reading::Clipped => beyond_walls(&self.model, region)
+        match (&self.walls, self.reading) {
+            (Some(walls), Reading::Clipped) => walls
+                .reached(region)
                 .map_or(0.0, |region| self.mass(level, mean, &region)),
             _ => self.mass(level, mean, region),
         }
@@ -446,30 +448,6 @@ impl BeliefMdp {
         }
         to
     }
-}
-
-/// The region with sides that touch the bounds pushed outwards for ever: what a Gaussian has beyond a bound sits at the bound.
-/// `None` where no state can be in the region.
-fn beyond_walls(model: &Model, region: &Region) -> Option<Region> {
-    let blocked = |map: &Map| map.blocked.contains(region);
-    if model.map.as_ref().is_some_and(blocked) {
-        return None;
-    }
-    let pushed = |&(variable, side): &(usize, Interval)| {
-        let bounds = model.state[variable].bounds;
-        let low = match side.low <= bounds.low {
-            true => f64::NEG_INFINITY,
-            false => side.low,
-        };
-        let high = match side.high >= bounds.high {
-            true => f64::INFINITY,
-            false => side.high,
-        };
-        let inside = side.low < bounds.high && side.high > bounds.low;
-        inside.then(|| (variable, Interval::new(low, high)))
-    };
-    let sides: Option<_> = region.sides.iter().map(pushed).collect();
-    Some(Region::new(sides?))
 }
 
 /// Mean and covariance of the mixture of all start hypotheses.

@@ -46,4 +46,5 @@ pub use recall::{Clusters, Recall};
 pub use space::{BeliefSpace, CodedSpace};
 pub use sum::{Component, Sum, SumKeeping};
 pub use tracker::{KalmanTracker, Tracker, Tracking};
+pub(crate) use updater::Pace;
 pub use updater::{Coded, Held, Updater};

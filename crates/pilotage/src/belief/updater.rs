@@ -24,6 +24,17 @@ pub enum Updater {
     Cells(Coded<CellsKeeping>),
 }
 
+/// How long a step of a belief takes, each a power of ten or more from the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Pace {
+    /// A microsecond: a mean is moved.
+    Fast,
+    /// Some ten microseconds.
+    Usual,
+    /// Hundreds.
+    Slow,
+}
+
 /// A way to keep beliefs in full, with the codebook that they are read by.
 #[derive(Debug)]
 pub struct Coded<K> {
@@ -149,6 +160,18 @@ impl Updater {
             Self::Linear(_) => TrackerKind::Linear,
             Self::Sum(_) => TrackerKind::Sum,
             Self::Cells(_) => TrackerKind::Cells,
+        }
+    }
+
+    /// How long it takes to keep a belief for a step.
+    pub(crate) fn pace(&self) -> Pace {
+        match self {
+            Self::Linear(_) => Pace::Fast,
+            Self::Sum(coded) => match coded.keeping.is_light() {
+                true => Pace::Usual,
+                false => Pace::Slow,
+            },
+            Self::Cells(_) => Pace::Usual,
         }
     }
 

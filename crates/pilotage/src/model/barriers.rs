@@ -1,6 +1,6 @@
 //! What stops motion: the bounds of the world, and the walls of its map where there is one.
 
-use super::{Interval, Map, Model};
+use super::{Interval, Map, Model, Region};
 
 /// The walls of a world. The true state stops at them, and so does a belief that knows of them.
 ///
@@ -31,6 +31,30 @@ impl Barriers {
     pub(crate) fn confine(&self, point: &mut [f64]) {
         let drawn = self.on_map(point, Map::nearest_free);
         self.clamp(point, drawn);
+    }
+
+    /// A region as a Gaussian is asked about it: sides that touch the bounds are pushed outwards for ever, since what a Gaussian has beyond a
+    /// bound sits at the bound. `None` where no state can be in the region.
+    pub(crate) fn reached(&self, region: &Region) -> Option<Region> {
+        let blocked = |map: &Map| map.blocked.contains(region);
+        if self.map.as_ref().is_some_and(blocked) {
+            return None;
+        }
+        let pushed = |&(variable, side): &(usize, Interval)| {
+            let bounds = self.bounds[variable];
+            let low = match side.low <= bounds.low {
+                true => f64::NEG_INFINITY,
+                false => side.low,
+            };
+            let high = match side.high >= bounds.high {
+                true => f64::INFINITY,
+                false => side.high,
+            };
+            let inside = side.low < bounds.high && side.high > bounds.low;
+            inside.then(|| (variable, Interval::new(low, high)))
+        };
+        let sides: Option<_> = region.sides.iter().map(pushed).collect();
+        Some(Region::new(sides?))
     }
 
     /// Replaces what the map draws; returns how many variables that are.

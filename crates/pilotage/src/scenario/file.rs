@@ -404,7 +404,7 @@ pub(super) struct BeliefTable {
     pub tracker: TrackerKind,
     /// Most Gaussians of a sum. Default: 16.
     pub components: Option<u64>,
-    /// Cells along a variable. Default: 40 to 200 for one state variable, as noise and the places where something is paid ask for; 40 for two.
+    /// Cells along a variable. Default: 40 to 200 for one state variable and 16 to 40 for two, as noise and the places where something is paid ask for.
     pub cells: Option<u64>,
 }
 

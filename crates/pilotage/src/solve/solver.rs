@@ -7,7 +7,7 @@ use super::lqg::LqgController;
 use super::{Form, Learning, refusals};
 use crate::belief::{BeliefMdp, BeliefSpace};
 use crate::error::{Error, Result};
-use crate::model::Model;
+use crate::model::{Model, TrackerKind};
 use crate::policy::{Automaton, Policy};
 use crate::progress::Progress;
 use crate::world::World;
@@ -23,10 +23,10 @@ pub trait Planner: Send + Sync {
     /// [`Error::Unsupported`] with the reason, and what would do.
     fn accepts(&self, model: &Model) -> Result<()>;
 
-    /// Whether it is one to try first for a model that it accepts: it finds something good in a minute or two.
+    /// Whether it is one to try first for a model that it accepts: it finds something good in a minute or two. Who plans on uncertainty
+    /// levels is not where the model asks for more.
     fn suits(&self, model: &Model) -> bool {
-        let _ = model;
-        true
+        !self.needs_levels() || model.tracker() == TrackerKind::Linear
     }
 
     /// Whether it plans on the uncertainty levels of a linear model; one that does not is handed models of any kind.

@@ -12,9 +12,9 @@ const CELLS: [usize; 2] = [200, 40];
 const MOST: usize = 100_000;
 
 /// Fewest cells along a variable where the model does not say, and how many lie at least in a standard deviation of all noise, and in the
-/// narrowest place where something is paid or happens: finer ones say nothing more.
-const FEWEST: f64 = 40.0;
-const WITHIN: f64 = 8.0;
+/// narrowest place where something is paid or happens, for one and for two variables: finer ones say little more.
+const FEWEST: [f64; 2] = [40.0, 16.0];
+const WITHIN: [f64; 2] = [8.0, 2.0];
 
 /// Where a variable has no bound, cells go so many standard deviations beyond every start.
 const SPREAD: f64 = 5.0;
@@ -36,17 +36,17 @@ const STEPS: f64 = 10.0;
 /// a cell each, squares of a map whole cells, and up to a quarter more cells are taken if controls then lead across whole ones.
 pub(super) fn grid(model: &Model, dynamics: &Dynamics) -> Result<Grid> {
     let n = model.state_dim();
-    let Some(usual) = n.checked_sub(1).and_then(|i| CELLS.get(i)) else {
+    if !(1..=CELLS.len()).contains(&n) {
         return Err(unsupported(
             model,
             format!(
                 "it has {n} state variables, and cells are kept of one or two; set `tracker = \"sum\"` in [belief]"
             ),
         ));
-    };
+    }
     let count = |variable: usize| match model.belief.cells {
         Some(cells) => cells.max(2),
-        None => enough(model, dynamics, variable, *usual),
+        None => enough(model, dynamics, variable),
     };
     let axes: Vec<Axis> = (0..n).map(|i| axis(model, dynamics, i, count(i))).collect();
     let all = axes.iter().map(|axis| axis.count as f64).product::<f64>();
@@ -96,14 +96,15 @@ fn axis(model: &Model, dynamics: &Dynamics, variable: usize, count: usize) -> Ax
 }
 
 /// How many cells it takes, and no more than usual.
-fn enough(model: &Model, dynamics: &Dynamics, variable: usize, usual: usize) -> usize {
+fn enough(model: &Model, dynamics: &Dynamics, variable: usize) -> usize {
+    let more = model.state_dim() - 1;
     let width = extent(model, dynamics, variable).width();
     match narrowest(model, dynamics, variable) {
         Some(narrowest) => {
-            let count = (WITHIN * width / narrowest).ceil().max(FEWEST);
-            count.min(usual as f64) as usize
+            let count = (WITHIN[more] * width / narrowest).ceil();
+            count.max(FEWEST[more]).min(CELLS[more] as f64) as usize
         }
-        None => usual,
+        None => CELLS[more],
     }
 }
 

@@ -96,9 +96,9 @@ fn unsupported(model: &Model, reason: String) -> Error {
 
 impl CellsKeeping {
     /// Cells of a model of one or two state variables, in which nothing changes with the step of the episode: as many along a variable as
-    /// its [`BeliefSettings::cells`](crate::model::BeliefSettings::cells) say; if they do not, 40 to 200 for one, at least eight to a standard
-    /// deviation of any noise and to the narrowest place where something is paid or happens, and 40 for two; and up to a quarter more if
-    /// controls then lead across whole cells. They lie between the bounds, and beyond them as far as the controls lead in
+    /// its [`BeliefSettings::cells`](crate::model::BeliefSettings::cells) say; if they do not, 40 to 200 for one and 16 to 40 for two, at
+    /// least eight (two) to a standard deviation of any noise and to the narrowest place where something is paid or happens; and up to a
+    /// quarter more if controls then lead across whole cells. They lie between the bounds, and beyond them as far as the controls lead in
     /// ten steps if they are no walls to the belief (at most half of their width for one variable and a quarter for two). Where there is
     /// no bound, or one three times farther out than anything else, they reach from the starts (5 standard deviations) and the places of
     /// which rewards and events speak as far as the controls lead from the starts in ten steps. Whole numbers have a cell each, angles the

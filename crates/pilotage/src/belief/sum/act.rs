@@ -23,6 +23,9 @@ const PAID: usize = 64;
 /// Standard deviations that they reach.
 const REACH: f64 = 6.0;
 
+/// Parts of a component that are left of a step: walls and events in the plane cut it into a hundred, most of them slivers.
+const PARTS: usize = 8;
+
 impl SumKeeping {
     /// Takes an action; what the episode goes on with is left in the sum.
     pub(super) fn take(&self, full: &mut Sum, action: ActionId, step: usize) -> Acted {
@@ -30,6 +33,7 @@ impl SumKeeping {
         let mut moved = Vec::with_capacity(full.components.len());
         let room = 3 * self.most.max(full.components.len());
         for component in std::mem::take(&mut full.components) {
+            let before = moved.len();
             let doing = self.doing(component.mode, action, step);
             let effects = self.effects.at(step, component.mode, action);
             acted.reward += component.weight * self.running_cost(&component, action);
@@ -41,7 +45,9 @@ impl SumKeeping {
             for part in self.happen(whole, effects, When::Before, own, doing, &mut acted) {
                 let happened = part.happened;
                 let room = room.saturating_sub(moved.len());
-                for component in self.moved(part.component, doing, room) {
+                let mut stopped = self.moved(part.component, doing, room);
+                self.likeness.reduce_from(&mut stopped, 0, PARTS);
+                for component in stopped {
                     let Some(component) = self.alive(component, &mut acted) else {
                         continue;
                     };
@@ -54,6 +60,7 @@ impl SumKeeping {
                     moved.extend(parts.into_iter().map(|part| part.component));
                 }
             }
+            self.likeness.reduce_from(&mut moved, before, PARTS);
         }
         normalise(&mut moved);
         full.components = moved;

@@ -163,31 +163,25 @@ impl Component {
         }
     }
 
-    /// What of it stays inside the bounds, and what has run against them: that sits at the bound.
-    pub(super) fn stopped(self, bounds: &[Interval]) -> Vec<Self> {
-        let mut parts = vec![self];
-        for (variable, side) in bounds.iter().enumerate() {
-            if side.low == f64::NEG_INFINITY && side.high == f64::INFINITY {
-                continue;
+    /// What of it stays inside the bounds of a variable, and what has run against them: that sits at the bound.
+    pub(super) fn stopped(self, variable: usize, side: Interval) -> Vec<Self> {
+        if side.low == f64::NEG_INFINITY && side.high == f64::INFINITY {
+            return vec![self];
+        }
+        let mut parts = Vec::new();
+        for part in self.finer_at(variable, side) {
+            let whole = part.weight;
+            let (mut inside, mut beyond) = part.cut_side(variable, side);
+            // What hardly ever happens is left out, and its weight kept.
+            beyond.retain(|part| part.weight > RARE * whole || inside.is_none());
+            if let Some(inside) = &mut inside {
+                inside.weight = whole - beyond.iter().map(|part| part.weight).sum::<f64>();
             }
-            let before = std::mem::take(&mut parts);
-            let finer = before
-                .into_iter()
-                .flat_map(|part| part.finer_at(variable, *side));
-            for part in finer.collect::<Vec<_>>() {
-                let whole = part.weight;
-                let (mut inside, mut beyond) = part.cut_side(variable, *side);
-                // What hardly ever happens is left out, and its weight kept.
-                beyond.retain(|part| part.weight > RARE * whole || inside.is_none());
-                if let Some(inside) = &mut inside {
-                    inside.weight = whole - beyond.iter().map(|part| part.weight).sum::<f64>();
-                }
-                parts.extend(inside);
-                for mut part in beyond {
-                    let at = side.clamp(part.mean[variable]);
-                    part.sit(variable, at);
-                    parts.push(part);
-                }
+            parts.extend(inside);
+            for mut part in beyond {
+                let at = side.clamp(part.mean[variable]);
+                part.sit(variable, at);
+                parts.push(part);
             }
         }
         parts

@@ -28,7 +28,8 @@ use reduce::{Likeness, normalise};
 use super::full::{Acted, Keeping, Moments, Sensed};
 use super::reading::Reading;
 use crate::model::{
-    ActionId, Doing, Dynamics, EffectTable, Interval, ModeId, Model, StartShape, VariableKind,
+    ActionId, Doing, Dynamics, Effect, EffectTable, Interval, ModeId, Model, StartShape,
+    VariableKind,
 };
 
 /// A sum of Gaussians.
@@ -54,6 +55,8 @@ pub struct SumKeeping {
     most: usize,
     /// Whether a Gaussian that is too wide for its sensor may become several.
     splits: bool,
+    /// Whether there is one Gaussian a mode, so that what walls make of each may as well be one at once.
+    whole: bool,
     likeness: Likeness,
     /// For expectations of smooth functions.
     rule: Rule,
@@ -75,6 +78,9 @@ const COMPONENTS: usize = 16;
 
 /// Gaussians of a mode in a coarse sum: what is free, and what has run against a wall on either side.
 const COARSE: usize = 3;
+
+/// So many times as many Gaussians may a sum have between an action and a reading, which tells the parts that events have cut apart.
+const CUT: usize = 4;
 
 /// A standard deviation so many times smaller than the start's, or than a tenth of the bounds, counts as none.
 const CERTAIN: f64 = 1e-4;
@@ -102,22 +108,33 @@ impl SumKeeping {
             CERTAIN * widest.fold(width, f64::max).max(f64::MIN_POSITIVE)
         };
         let walled = dynamics.walls().filter(|walls| walls.map.is_none());
+        let most = model.belief.components.unwrap_or(match model.is_linear() {
+            true => COMPONENTS.min(FEW * model.modes.len()),
+            false => COMPONENTS,
+        });
         let mut keeping = Self {
             start: Sum {
                 components: Vec::new(),
             },
-            most: model.belief.components.unwrap_or(match model.is_linear() {
-                true => COMPONENTS.min(FEW * model.modes.len()),
-                false => COMPONENTS,
-            }),
+            most,
             splits: true,
+            whole: most <= model.modes.len(),
             likeness: Likeness::new((0..n).map(floor).collect(), dynamics.kinds()),
             rule: Rule::new(n, if n == 1 { 9 } else { 5 }),
             fine: Rule::new(n, if n == 1 { 15 } else { 7 }),
             gusts: Rule::cubature(n),
             posterior: (1..=n).map(posterior_rule).collect(),
             bounds: walled.map(|walls| walls.bounds.clone()),
-            effects: EffectTable::new(model, |effects| effects),
+            effects: EffectTable::new(model, |effects| match dynamics.walls() {
+                Some(walls) => effects
+                    .into_iter()
+                    .filter_map(|effect| {
+                        let region = walls.reached(&effect.region)?;
+                        Some(Effect { region, ..effect })
+                    })
+                    .collect(),
+                None => effects,
+            }),
             model: model.clone(),
             dynamics,
         };
@@ -147,10 +164,7 @@ impl SumKeeping {
             match (whole, shape) {
                 (true, shape) => components.extend(points(&component, shape)),
                 (false, StartShape::Uniform) => components.extend(slices(component)),
-                (false, StartShape::Normal) => match &self.bounds {
-                    Some(bounds) => components.extend(component.stopped(bounds)),
-                    None => components.push(component),
-                },
+                (false, StartShape::Normal) => components.extend(self.stopped(component)),
             }
         }
         let alive = &self.model.episode.alive;
@@ -164,6 +178,11 @@ impl SumKeeping {
             _ => self.most,
         };
         Sum { components }
+    }
+
+    /// Whether there are few Gaussians, or these on a line.
+    pub(crate) fn is_light(&self) -> bool {
+        self.whole || self.dynamics.states() == 1
     }
 
     fn doing(&self, mode: ModeId, action: ActionId, step: usize) -> Doing {
@@ -276,7 +295,7 @@ impl Keeping for SumKeeping {
         let count = full.components.len();
         let acted = self.take(full, action, step);
         if full.components.len() > count {
-            self.likeness.reduce(&mut full.components, 2 * self.most);
+            self.likeness.reduce(&mut full.components, CUT * self.most);
         }
         acted
     }

@@ -109,10 +109,7 @@ impl SumKeeping {
         if self.dynamics.kinds().contains(&VariableKind::Angle) {
             self.dynamics.wrap(&mut moved.mean);
         }
-        let parts = match &self.bounds {
-            Some(bounds) => moved.stopped(bounds),
-            None => vec![moved],
-        };
+        let parts = self.stopped(moved);
         match self.dynamics.kinds().contains(&VariableKind::Integer) {
             true => parts
                 .into_iter()
@@ -120,6 +117,19 @@ impl SumKeeping {
                 .collect(),
             false => parts,
         }
+    }
+
+    /// What of it the bounds let through and what they stop, where they are known.
+    pub(super) fn stopped(&self, component: Component) -> Vec<Component> {
+        let mut parts = vec![component];
+        for (variable, side) in self.bounds.iter().flatten().enumerate() {
+            let stop = |part: Component| part.stopped(variable, *side);
+            parts = parts.into_iter().flat_map(stop).collect();
+            if self.whole {
+                self.likeness.join(&mut parts);
+            }
+        }
+        parts
     }
 
     /// Whole numbers: along a line every one that is likely, elsewhere the nearest to a narrow Gaussian; a wide one keeps its shape.

@@ -70,6 +70,31 @@ impl Likeness {
         normalise(components);
     }
 
+    /// The same for those from a place on, whose weights keep their sum; few of them stay as they are.
+    pub(super) fn reduce_from(&self, components: &mut Vec<Component>, first: usize, most: usize) {
+        if components.len() <= first + most {
+            return;
+        }
+        let mut last = components.split_off(first);
+        let weight: f64 = last.iter().map(|component| component.weight).sum();
+        self.reduce(&mut last, most);
+        for component in &mut last {
+            component.weight *= weight;
+        }
+        components.extend(last);
+    }
+
+    /// Makes components of one mode one.
+    pub(super) fn join(&self, components: &mut Vec<Component>) {
+        let Some((first, others)) = components.split_first_mut() else {
+            return;
+        };
+        for other in others {
+            self.merge(first, other);
+        }
+        components.truncate(1);
+    }
+
     /// Takes another component in, so that weight, mean and covariance are those of both.
     pub(super) fn merge(&self, one: &mut Component, other: &Component) {
         let n = one.dim();
@@ -95,8 +120,14 @@ impl Likeness {
         one.weight = total;
     }
 
-    /// How much merging raises the entropy at most; `sizes` are those of both.
-    fn cost(&self, one: &Component, other: &Component, sizes: (f64, f64)) -> f64 {
+    /// How much merging raises the entropy at most, if that is less than `below`; `sizes` are those of both.
+    fn cost(
+        &self,
+        one: &Component,
+        other: &Component,
+        sizes: (f64, f64),
+        below: f64,
+    ) -> Option<f64> {
         let total = one.weight + other.weight;
         let (a, b) = (one.weight / total, other.weight / total);
         let apart = |i: usize| self.apart(i, one.mean[i], other.mean[i]);
@@ -104,21 +135,28 @@ impl Likeness {
             a * one.covariance[k] + b * other.covariance[k] + a * b * between
         };
         let floor = |i: usize| self.floors[i] * self.floors[i];
-        let merged = match self.floors.len() {
-            1 => (entry(0, apart(0) * apart(0)) + floor(0)).ln(),
+        let cost =
+            |merged: f64| 0.5 * (total * merged - one.weight * sizes.0 - other.weight * sizes.1);
+        let of = |determinant: f64| {
+            // Most pairs are far from the best, and a logarithm costs more than all the rest.
+            let may = cost(logarithm_at_least(determinant)) < below;
+            may.then(|| cost(determinant.ln()))
+        };
+        let cost = match self.floors.len() {
+            1 => of(entry(0, apart(0) * apart(0)) + floor(0)),
             2 => {
                 let (x, y) = (apart(0), apart(1));
                 let (xx, yy) = (entry(0, x * x) + floor(0), entry(3, y * y) + floor(1));
                 let xy = entry(1, x * y);
-                (xx * yy - xy * xy).max(f64::MIN_POSITIVE).ln()
+                of((xx * yy - xy * xy).max(f64::MIN_POSITIVE))
             }
             _ => {
                 let mut both = one.clone();
                 self.merge(&mut both, other);
-                self.size(&both.covariance)
+                Some(cost(self.size(&both.covariance)))
             }
         };
-        0.5 * (total * merged - one.weight * sizes.0 - other.weight * sizes.1)
+        cost.filter(|cost| *cost < below)
     }
 
     /// Logarithm of the determinant of a covariance, with the floors added.
@@ -172,17 +210,17 @@ impl Pairs<'_> {
             if components[j].mode != components[i].mode {
                 break;
             }
-            let cost = self.cost(components, i, j);
-            if cost < best.0 {
+            if let Some(cost) = self.cost(components, (i, j), best.0) {
                 best = (cost, j);
             }
         }
         best
     }
 
-    fn cost(&self, components: &[Component], i: usize, j: usize) -> f64 {
+    fn cost(&self, components: &[Component], (i, j): (usize, usize), below: f64) -> Option<f64> {
         let sizes = (self.sizes[i], self.sizes[j]);
-        self.likeness.cost(&components[i], &components[j], sizes)
+        self.likeness
+            .cost(&components[i], &components[j], sizes, below)
     }
 
     fn on_a_line(&self) -> bool {
@@ -208,13 +246,19 @@ impl Pairs<'_> {
             }
             // To those before it, what has grown may have come nearer.
             if i < one && !self.on_a_line() && components[i].mode == components[one].mode {
-                let cost = self.cost(components, i, one);
-                if cost < self.best[i].0 {
+                if let Some(cost) = self.cost(components, (i, one), self.best[i].0) {
                     self.best[i] = (cost, one);
                 }
             }
         }
     }
+}
+
+/// A number that the natural logarithm of a positive one exceeds by at most 0.06: between powers of two the logarithm lies above its chord.
+fn logarithm_at_least(x: f64) -> f64 {
+    const MANTISSA: f64 = (1_u64 << 52) as f64;
+    const BIAS: f64 = 1023.0;
+    (x.to_bits() as f64 / MANTISSA - BIAS) * std::f64::consts::LN_2
 }
 
 /// Makes weights sum to 1.

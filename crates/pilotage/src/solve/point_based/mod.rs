@@ -36,7 +36,7 @@ use super::settings::{PAIRED, Settings, ensure, ensure_count};
 use super::solver::{Found, Plan, Planner, Problem, refuse, refuse_if};
 use crate::belief::{CellsKeeping, Codebook, Coded, CodedSpace, Keeping, Moments, Updater};
 use crate::error::Result;
-use crate::model::Model;
+use crate::model::{Model, TrackerKind};
 use crate::progress::Progress;
 use crate::random::{Rng, Role, stream};
 use backup::Backup;
@@ -220,9 +220,9 @@ impl Planner for PointBased {
         accepts(model)
     }
 
-    /// Cells of two variables are many.
+    /// Cells of two variables are many, and worth it where the model asks for them.
     fn suits(&self, model: &Model) -> bool {
-        model.state_dim() == 1
+        model.state_dim() == 1 || model.belief.tracker == TrackerKind::Cells
     }
 
     fn needs_levels(&self) -> bool {

@@ -18,8 +18,7 @@ mod tests;
 
 use std::collections::VecDeque;
 
-use crate::belief::BeliefSpace;
-use crate::model::TrackerKind;
+use crate::belief::{BeliefSpace, Pace};
 use crate::policy::{
     Automaton, AutomatonRunner, Branch, Matching, Node, Place, Policy, Test, Tree,
 };
@@ -63,8 +62,10 @@ const TRIAL_STEPS: f64 = 12.5;
 /// Trees that are compared in more episodes once all have been tried. Half of them go on to twice as many, as often as that leaves one.
 const FINALISTS: usize = 8;
 
-/// So many times fewer episodes are run where beliefs are sums of Gaussians in several variables, which take far longer than others.
+/// So many times fewer episodes are run where a step of the belief takes far longer than elsewhere, and so many times more where it takes
+/// next to nothing.
 const SLOWER: usize = 10;
+const FASTER: usize = 4;
 
 /// Trees that may be no better than those before, one after the other, until no larger one is tried.
 const PATIENCE: usize = 4;
@@ -88,9 +89,10 @@ pub(super) fn grow(
         policy,
         space,
         size,
-        episodes: match space.updater().kind() {
-            TrackerKind::Sum if space.model().state_dim() > 1 => episodes.div_ceil(SLOWER),
-            _ => episodes,
+        episodes: match space.updater().pace() {
+            Pace::Fast => FASTER * episodes,
+            Pace::Usual => episodes,
+            Pace::Slow => episodes.div_ceil(SLOWER),
         },
         seed,
         bare: automaton.clone(),
