@@ -114,8 +114,8 @@ impl Codebook {
     }
 
     /// Adds strata of beliefs, the one that is farthest from all strata so far first, until all are nearer than `apart` or there are
-    /// `most`.
-    pub fn cover(&mut self, met: &[Moments], apart: f64, most: usize) {
+    /// `most`. Returns which beliefs these are, in the order of their strata.
+    pub fn cover(&mut self, met: &[Moments], apart: f64, most: usize) -> Vec<usize> {
         let mut codes = vec![Vec::new(); met.len()];
         for (moments, code) in met.iter().zip(&mut codes) {
             self.write_code(moments, code);
@@ -127,6 +127,7 @@ impl Codebook {
                 .fold(f64::INFINITY, f64::min)
         };
         let mut gaps: Vec<f64> = codes.iter().map(nearest).collect();
+        let mut added = Vec::new();
         while self.strata.len() < most {
             let farthest =
                 (0..met.len()).max_by(|&a, &b| gaps[a].total_cmp(&gaps[b]).then(b.cmp(&a)));
@@ -138,7 +139,9 @@ impl Codebook {
                 *gap = gap.min(distance(code, &chosen));
             }
             self.add(&met[farthest]);
+            added.push(farthest);
         }
+        added
     }
 
     /// Orders strata by their most likely mode, and from wide to narrow within it, as uncertainty levels are.

@@ -53,8 +53,8 @@ pub trait Keeping: Send + Sync {
     /// A belief in full.
     type Full: Clone + Send + Sync;
 
-    /// The same way of keeping beliefs, as coarse as the moments of a belief allow: what becomes of beliefs that are known by their moments
-    /// alone is found faster by it. `None` where it is as fast already.
+    /// The same way of keeping beliefs, and coarser: what becomes of a belief of which little more than its moments is known is found faster
+    /// by it. `None` where it is as fast already.
     fn coarse(&self) -> Option<Self>
     where
         Self: Sized,
@@ -92,6 +92,6 @@ pub trait Keeping: Send + Sync {
     /// A belief with these moments: one Gaussian a mode, all with that mean and covariance.
     fn with_moments(&self, moments: &Moments) -> Self::Full;
 
-    /// The same belief with its mean elsewhere (length `n`), as far as a state can be there.
+    /// The same belief with its mean elsewhere (length `n`), as far as a state can be there, and as far as beliefs are kept as fine as it.
     fn moved_to(&self, full: &Self::Full, mean: &[f64]) -> Self::Full;
 }

@@ -386,6 +386,9 @@ impl Keeping for SumKeeping {
             }
             self.dynamics.round_within(&mut component.mean);
         }
+        if moved.components.len() > self.most {
+            self.likeness.reduce(&mut moved.components, self.most);
+        }
         moved
     }
 }

@@ -159,17 +159,20 @@ impl CodebookPlanner {
         let mut codebook = Codebook::new(model);
         let mut met = meet(model, keeping.as_ref(), None, self.episodes, seed);
         let mut best: Option<Round> = None;
+        let mut shapes: Vec<K::Full> = Vec::new();
         let mut earlier: Option<Rows> = None;
         for round in 0..self.rounds {
             observer.progress("rounds", round as u64, self.rounds as u64);
             let moments: Vec<Moments> = met.iter().map(|met| met.moments.clone()).collect();
-            codebook.cover(&moments, self.apart, self.strata_of(round));
+            let added = codebook.cover(&moments, self.apart, self.strata_of(round));
+            shapes.extend(added.into_iter().map(|i| met[i].full.clone()));
             let reaches = |rows: &Rows| moments.iter().all(|met| rows.grid.contains(&met.mean));
             earlier = earlier.filter(reaches);
             let known = earlier.as_ref().map(|rows| rows.grid.clone());
             let grid = known.unwrap_or_else(|| self.grid(model, &moments));
             let ways = (keeping.as_ref(), coarse.as_ref().unwrap_or(&keeping));
-            let rows = Rows::new(ways, &codebook, grid, &met, self, earlier.take());
+            let strata = (&codebook, shapes.as_slice());
+            let rows = Rows::new(ways, strata, grid, &met, self, earlier.take());
             let found = rows.solve(model.discount, self.tolerance);
             let planned = rows.worth(keeping.as_ref(), &codebook, &found, model.discount, self);
             let grid = rows.grid.clone();

@@ -108,11 +108,11 @@ fn averaged(rows: &[Row]) -> Row {
 }
 
 impl Rows {
-    /// The rows of a codebook, refined on beliefs that were met. Earlier rows on the same grid are taken over where nothing was or is
+    /// The rows of a codebook, whose strata have the shapes of beliefs in full, refined on beliefs that were met. Earlier rows on the same grid are taken over where nothing was or is
     /// refined: strata stay what they are when others join them.
     pub(super) fn new<K: Keeping>(
         (keeping, coarse): (&K, &K),
-        codebook: &Codebook,
+        (codebook, shapes): (&Codebook, &[K::Full]),
         grid: Grid,
         met: &[Met<K::Full>],
         settings: &CodebookPlanner,
@@ -140,12 +140,7 @@ impl Rows {
                     (keeping, fulls.iter().map(moved).collect::<Vec<K::Full>>())
                 }
                 None => {
-                    let stratum = codebook.stratum(state / points);
-                    let full = coarse.with_moments(&Moments {
-                        mean,
-                        covariance: stratum.covariance.clone(),
-                        weights: stratum.weights.clone(),
-                    });
+                    let full = coarse.moved_to(&shapes[state / points], &mean);
                     (coarse, vec![full])
                 }
             };
