@@ -270,3 +270,19 @@ pub(super) fn normalise(components: &mut [Component]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::logarithm_at_least;
+
+    proptest! {
+        #[test]
+        fn the_chord_lies_below_the_logarithm(exponent in -600.0_f64..600.0) {
+            let x = exponent.exp();
+            let gap = x.ln() - logarithm_at_least(x);
+            prop_assert!((-1e-12..0.06).contains(&gap), "{gap} at {x}");
+        }
+    }
+}

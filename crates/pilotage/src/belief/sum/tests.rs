@@ -339,10 +339,10 @@ fn assert_near(found: &[f64], exact: &[f64], tolerance: f64) {
 
 #[test]
 fn what_runs_against_walls_stays_there() {
-    let model = |walls| {
+    let model = |components| {
         let belief = BeliefSettings {
-            walls,
-            ..sums(None)
+            walls: WallBelief::Clip,
+            ..sums(components)
         };
         ModelBuilder::new("walled", 0.9)
             .variable("x", 0.0, 10.0)
@@ -356,9 +356,6 @@ fn what_runs_against_walls_stays_there() {
             .build()
             .unwrap()
     };
-    let keeping = SumKeeping::new(&model(WallBelief::Clip));
-    let mut sum = keeping.start();
-    keeping.act(&mut sum, 0, 0);
     let mut rng = stream(8, 0, Role::World);
     let drawn = (0..400_000).map(|_| {
         let z = [(); 4].map(|()| normal(&mut rng));
@@ -368,9 +365,76 @@ fn what_runs_against_walls_stays_there() {
         [x.max(0.0), y]
     });
     let (mean, covariance) = drawn_moments(drawn);
-    let found = moments(&keeping, &sum);
-    assert_near(&found.mean, &mean, 0.01);
-    assert_near(&found.covariance, &covariance, 0.03);
+    for components in [None, Some(1)] {
+        let keeping = SumKeeping::new(&model(components));
+        let mut sum = keeping.start();
+        keeping.act(&mut sum, 0, 0);
+        let found = moments(&keeping, &sum);
+        assert_near(&found.mean, &mean, 0.01);
+        assert_near(&found.covariance, &covariance, 0.03);
+    }
+}
+
+/// A Gaussian at a wall reaches beyond it, and what it has there is at the wall.
+#[test]
+fn a_place_at_a_wall_holds_what_is_believed_beyond_it() {
+    let model = |components| {
+        let belief = BeliefSettings {
+            walls: WallBelief::Clip,
+            ..sums(Some(components))
+        };
+        ModelBuilder::new("walled", 0.9)
+            .variable("x", 0.0, 4.0)
+            .start(&[2.5], &[0.25])
+            .motion(&[1.0], &[1.0], &[0.25])
+            .sensor(&[1.0], &[1.0])
+            .action("EAST", &[1.0])
+            .reward(1.0, Clause::new().within("x", 3.0, 4.0))
+            .belief(belief)
+            .build()
+            .unwrap()
+    };
+    // Moved by 1 with a variance of 0.5 in all, then stopped at 4.
+    let there = 1.0 - normal_cdf((3.0 - 3.5) / 0.5_f64.sqrt());
+    for (components, tolerance) in [(1, 0.03), (8, 0.005)] {
+        let keeping = SumKeeping::new(&model(components));
+        let mut sum = keeping.start();
+        keeping.act(&mut sum, 0, 0);
+        let paid = keeping.act(&mut sum, 0, 1).reward;
+        assert!((paid - there).abs() < tolerance, "{paid}, not {there}");
+    }
+}
+
+proptest! {
+    /// Merging the last of some Gaussians changes neither the others nor the moments.
+    #[test]
+    fn merging_some_keeps_the_moments_of_all(
+        means in proptest::collection::vec((-5.0..5.0, -5.0..5.0, 0.1..2.0), 6..20),
+        first in 0_usize..4,
+        most in 1_usize..4,
+    ) {
+        let likeness = Likeness::new(vec![1e-6; 2], &[VariableKind::Real; 2]);
+        let component = |&(x, y, variance): &(f64, f64, f64)| Component {
+            weight: variance / 40.0,
+            mode: 0,
+            mean: vec![x, y],
+            covariance: vec![variance, 0.3 * variance, 0.3 * variance, 1.0],
+        };
+        let before: Vec<Component> = means.iter().map(component).collect();
+        let whole = |components: &[Component]| {
+            let mut all = components.to_vec();
+            likeness.join(&mut all);
+            all.remove(0)
+        };
+        let mut after = before.clone();
+        likeness.reduce_from(&mut after, first, most);
+        prop_assert!(after.len() <= first + most);
+        prop_assert_eq!(&after[..first], &before[..first]);
+        let (found, exact) = (whole(&after), whole(&before));
+        prop_assert!((found.weight - exact.weight).abs() < 1e-12);
+        assert_near(&found.mean, &exact.mean, 1e-9);
+        assert_near(&found.covariance, &exact.covariance, 1e-9);
+    }
 }
 
 #[test]
