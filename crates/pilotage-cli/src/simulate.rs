@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
+use pilotage::Error;
 use pilotage::belief::BeliefMdp;
 use pilotage::policy::{Automaton, AutomatonRunner};
 use pilotage::scenario::{self, Scenario};
@@ -95,6 +96,14 @@ fn wake_up(
     automaton: &Automaton,
     bars: &Bars,
 ) -> Result<(), Failure> {
+    if automaton.updater.filter().is_none() {
+        return Err(Error::Unsupported {
+            solver: "wake-up",
+            model: model.name.clone(),
+            reason: "its hypotheses are followed by filters, and this policy keeps its belief in full, in which all starts are already; simulate it without --wake-up, or solve with value-iteration".to_owned(),
+        }
+        .into());
+    }
     let settings = Settings {
         episodes: arguments.evaluation.episodes,
         seed: arguments.evaluation.seed,

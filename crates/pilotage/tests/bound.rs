@@ -364,13 +364,13 @@ fn every_model_has_a_bound_with_a_reason_or_a_refusal() {
         "corridor-blind",
         "corridor-declare",
         "corridor-unbounded",
-        "maze-2d",
+        "maze-2d-unbounded",
     ];
     for name in beliefs {
         assert_eq!(bounded(&built_in(name)).method, Method::Beliefs, "{name}");
     }
     assert_eq!(bounded(&built_in("tiger")).method, Method::Points);
-    for name in ["n-maze", "u-maze", "cart-pole"] {
+    for name in ["maze-2d", "n-maze", "u-maze", "cart-pole"] {
         let found = bounded(&built_in(name));
         assert!(
             matches!(found.method, Method::Ceiling { .. }),

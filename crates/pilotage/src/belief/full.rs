@@ -62,6 +62,11 @@ pub trait Keeping: Send + Sync {
         None
     }
 
+    /// Whether a step of a belief takes little time: some ten microseconds.
+    fn is_light(&self) -> bool {
+        false
+    }
+
     /// Number of actions.
     fn actions(&self) -> usize;
 

@@ -180,11 +180,6 @@ impl SumKeeping {
         Sum { components }
     }
 
-    /// Whether there are few Gaussians, or these on a line.
-    pub(crate) fn is_light(&self) -> bool {
-        self.whole || self.dynamics.states() == 1
-    }
-
     fn doing(&self, mode: ModeId, action: ActionId, step: usize) -> Doing {
         Doing { mode, action, step }
     }
@@ -281,6 +276,10 @@ impl Keeping for SumKeeping {
             posterior: (1..=self.dynamics.states()).map(coarse_rule).collect(),
             ..Self::new(&self.model)
         })
+    }
+
+    fn is_light(&self) -> bool {
+        self.whole || self.dynamics.states() == 1
     }
 
     fn actions(&self) -> usize {

@@ -1,14 +1,17 @@
 //! Values of actions by stratum and mean, as a policy.
 
-use crate::belief::Belief;
+use std::sync::Arc;
+
+use crate::belief::{Belief, Codebook, Held, Moments};
 use crate::model::ActionId;
-use crate::policy::Policy;
+use crate::policy::{Policy, first_best};
 use crate::solve::grid::Grid;
 
-/// Values of all actions on a grid of means, for every stratum.
+/// Values of all actions on a grid of means, for every stratum. A belief in full lies between several strata, one that is read is of one.
 #[derive(Debug, Clone)]
 pub struct GridValues {
     grid: Grid,
+    codebook: Arc<Codebook>,
     /// By action and stratum: a value for every point of the grid.
     values: Vec<Vec<f64>>,
     strata: usize,
@@ -17,8 +20,8 @@ pub struct GridValues {
 
 impl GridValues {
     /// Of values by stratum, point and action.
-    pub(super) fn new(grid: Grid, found: Vec<f64>, strata: usize, actions: usize) -> Self {
-        let points = grid.len();
+    pub(super) fn new(grid: Grid, codebook: Arc<Codebook>, found: &[f64], actions: usize) -> Self {
+        let (points, strata) = (grid.len(), codebook.len());
         let of = |action: usize, stratum: usize| {
             let at = move |point: usize| (stratum * points + point) * actions + action;
             (0..points).map(|point| found[at(point)]).collect()
@@ -29,9 +32,28 @@ impl GridValues {
                 .map(|(action, stratum)| of(action, stratum))
                 .collect(),
             grid,
+            codebook,
             strata,
             actions,
         }
+    }
+
+    /// What every action is worth at a belief of these moments, of which its plan was made: between strata and between points.
+    pub(super) fn values_between(&self, moments: &Moments) -> Vec<f64> {
+        let strata = self.codebook.between(moments, &mut Vec::new());
+        let around = self.grid.around(&moments.mean);
+        let value = |action: usize| -> f64 {
+            let of = |&(stratum, weight): &(usize, f64)| {
+                let values = &self.values[action * self.strata + stratum];
+                let points = around.iter();
+                weight
+                    * points
+                        .map(|(point, part)| part * values[*point])
+                        .sum::<f64>()
+            };
+            strata.iter().map(of).sum()
+        };
+        (0..self.actions).map(value).collect()
     }
 
     fn best(&self, belief: &Belief) -> (ActionId, f64) {
@@ -56,6 +78,17 @@ impl Policy for GridValues {
     fn action_value(&self, belief: &Belief, action: ActionId) -> Option<f64> {
         let values = &self.values[action * self.strata + belief.stratum.min(self.strata - 1)];
         Some(self.grid.interpolate(values, &belief.mean))
+    }
+
+    fn action_in_full(&self, held: &Held) -> ActionId {
+        match self.values_in_full(held) {
+            Some(values) => first_best(&values),
+            None => self.action(held.belief()),
+        }
+    }
+
+    fn values_in_full(&self, held: &Held) -> Option<Vec<f64>> {
+        held.moments().map(|moments| self.values_between(moments))
     }
 
     fn value(&self, belief: &Belief) -> Option<f64> {

@@ -1,9 +1,9 @@
 //! Beliefs that are met by acting in the world that a model assumes.
 
-use crate::belief::{Belief, Codebook, Keeping, Moments};
+use crate::belief::{Keeping, Moments};
 use crate::model::{Model, Then};
 use crate::parallel;
-use crate::policy::Policy;
+use crate::policy::first_best;
 use crate::random::{Rng, Role, stream, uniform};
 use crate::scenario::Scenario;
 use crate::solve::codebook::GridValues;
@@ -29,7 +29,7 @@ const MOST: usize = 100;
 pub(super) fn meet<K: Keeping>(
     model: &Model,
     keeping: &K,
-    policy: Option<(&GridValues, &Codebook)>,
+    policy: Option<&GridValues>,
     episodes: usize,
     seed: u64,
 ) -> Vec<Met<K::Full>> {
@@ -40,7 +40,6 @@ pub(super) fn meet<K: Keeping>(
         let mut whims = stream(seed, episode as u64, Role::Exploration);
         let mut observation = Observation::new(model.observation_dim());
         let mut met = Vec::new();
-        let mut code = Vec::new();
         let mut action = any(model, &mut whims);
         let mut full = keeping.start();
         world.reset(&mut draws);
@@ -48,12 +47,8 @@ pub(super) fn meet<K: Keeping>(
             let mut moments = Moments::default();
             keeping.moments(&full, &mut moments);
             action = match policy {
-                Some((policy, codebook)) if uniform(&mut whims) >= SLIPS => {
-                    policy.action(&Belief {
-                        stratum: codebook.nearest(&moments, &mut code),
-                        mode: 0,
-                        mean: moments.mean.clone(),
-                    })
+                Some(policy) if uniform(&mut whims) >= SLIPS => {
+                    first_best(&policy.values_between(&moments))
                 }
                 None if uniform(&mut whims) >= TURNS => action,
                 _ => any(model, &mut whims),

@@ -42,20 +42,22 @@ const SOLVER: &str = "codebook";
 /// The planner on a codebook of strata.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CodebookPlanner {
-    /// Most strata; at least 1, at most 1000.
-    pub strata: usize,
+    /// Most strata; at least 1, at most 1000, or `auto` for 120 where a step of a belief takes little time and 40 elsewhere.
+    pub strata: Option<usize>,
     /// How far apart strata are at least, in units of the logarithm of a standard deviation; more than 0.
     pub apart: f64,
     /// Points of the grid of means along each variable; at least 2, or `auto` for what suits the number of variables.
     pub points: Option<usize>,
     /// Readings that are thought of after an action; at least 1.
     pub readings: usize,
-    /// Times that the plan is refined on the beliefs that it meets; at least 1.
-    pub rounds: usize,
+    /// Times that the plan is refined on the beliefs that it meets; at least 1, or `auto` for 3 where a step of a belief takes little time and
+    /// 2 elsewhere.
+    pub rounds: Option<usize>,
     /// Episodes that are run to meet beliefs in a round; at least 1, at most a million.
     pub episodes: usize,
-    /// Most beliefs in full that a round refines on; at least 0.
-    pub refined: usize,
+    /// Most beliefs in full that a round refines on; at least 0, or `auto` for 4000 where a step of a belief takes little time and 1000
+    /// elsewhere.
+    pub refined: Option<usize>,
     /// Largest change of a value in the last sweep, as a share of the largest value; more than 0.
     pub tolerance: f64,
 }
@@ -63,13 +65,13 @@ pub struct CodebookPlanner {
 impl Default for CodebookPlanner {
     fn default() -> Self {
         Self {
-            strata: 40,
+            strata: None,
             apart: 0.12,
             points: None,
             readings: 9,
-            rounds: 2,
+            rounds: None,
             episodes: 200,
-            refined: 1000,
+            refined: None,
             tolerance: 1e-6,
         }
     }
@@ -77,17 +79,14 @@ impl Default for CodebookPlanner {
 
 impl Settings for CodebookPlanner {
     fn validate(&self) -> Result<()> {
-        ensure(
-            "strata",
-            self.strata,
-            (1..=1000).contains(&self.strata),
-            "1 to 1000",
-        )?;
+        let strata = self.strata.unwrap_or(1);
+        ensure("strata", strata, (1..=1000).contains(&strata), "1 to 1000")?;
         ensure("apart", self.apart, self.apart > 0.0, "above 0")?;
         let points = self.points.unwrap_or(2);
         ensure("points", points, points >= 2, "at least 2")?;
         ensure("readings", self.readings, self.readings >= 1, "at least 1")?;
-        ensure("rounds", self.rounds, self.rounds >= 1, "at least 1")?;
+        let rounds = self.rounds.unwrap_or(1);
+        ensure("rounds", rounds, rounds >= 1, "at least 1")?;
         super::rollout::check_runs("episodes", self.episodes)?;
         ensure("tolerance", self.tolerance, self.tolerance > 0.0, "above 0")
     }
@@ -137,6 +136,25 @@ impl Planner for CodebookPlanner {
     }
 }
 
+/// How much is planned for.
+#[derive(Debug, Clone, Copy)]
+struct Size {
+    strata: usize,
+    rounds: usize,
+    refined: usize,
+}
+
+impl Size {
+    /// Most strata of a round: three quarters of all in the first, so that later ones find room for strata of what they have met.
+    fn strata_of(self, round: usize) -> usize {
+        let later = self.strata / 4;
+        match self.rounds {
+            1 => self.strata,
+            rounds => self.strata - later + (later * round).div_ceil(rounds - 1),
+        }
+    }
+}
+
 /// What a round of planning found.
 struct Round {
     values: GridValues,
@@ -155,16 +173,17 @@ impl CodebookPlanner {
         seed: u64,
         observer: &dyn Progress,
     ) -> Result<Plan> {
+        let size = self.size(keeping.is_light());
         let coarse = keeping.coarse();
         let mut codebook = Codebook::new(model);
         let mut met = meet(model, keeping.as_ref(), None, self.episodes, seed);
         let mut best: Option<Round> = None;
         let mut shapes: Vec<K::Full> = Vec::new();
         let mut earlier: Option<Rows> = None;
-        for round in 0..self.rounds {
-            observer.progress("rounds", round as u64, self.rounds as u64);
+        for round in 0..size.rounds {
+            observer.progress("rounds", round as u64, size.rounds as u64);
             let moments: Vec<Moments> = met.iter().map(|met| met.moments.clone()).collect();
-            let added = codebook.cover(&moments, self.apart, self.strata_of(round));
+            let added = codebook.cover(&moments, self.apart, size.strata_of(round));
             shapes.extend(added.into_iter().map(|i| met[i].full.clone()));
             let reaches = |rows: &Rows| moments.iter().all(|met| rows.grid.contains(&met.mean));
             earlier = earlier.filter(reaches);
@@ -172,13 +191,20 @@ impl CodebookPlanner {
             let grid = known.unwrap_or_else(|| self.grid(model, &moments));
             let ways = (keeping.as_ref(), coarse.as_ref().unwrap_or(&keeping));
             let strata = (&codebook, shapes.as_slice());
-            let rows = Rows::new(ways, strata, grid, &met, self, earlier.take());
+            let rows = Rows::new(
+                ways,
+                strata,
+                grid,
+                &met,
+                (size.refined, self.readings),
+                earlier.take(),
+            );
             let found = rows.solve(model.discount, self.tolerance);
             let planned = rows.worth(keeping.as_ref(), &codebook, &found, model.discount, self);
             let grid = rows.grid.clone();
-            let values = GridValues::new(grid, found, codebook.len(), model.actions.len());
             earlier = Some(rows);
             let shared = Arc::new(codebook.clone());
+            let values = GridValues::new(grid, Arc::clone(&shared), &found, model.actions.len());
             let updater = updater(Coded::new(model, Arc::clone(&keeping), Arc::clone(&shared)));
             let options = Options {
                 episodes: TRIALS * self.episodes,
@@ -196,7 +222,7 @@ impl CodebookPlanner {
             met = meet(
                 model,
                 keeping.as_ref(),
-                Some((&values, &codebook)),
+                Some(&values),
                 self.episodes,
                 seed.wrapping_add(2 + round as u64),
             );
@@ -210,11 +236,11 @@ impl CodebookPlanner {
                 });
             }
         }
-        observer.progress("rounds", self.rounds as u64, self.rounds as u64);
+        observer.progress("rounds", size.rounds as u64, size.rounds as u64);
         let Some(best) = best else {
             return Err(crate::Error::Setting {
                 setting: "rounds",
-                value: self.rounds.to_string(),
+                value: size.rounds.to_string(),
                 range: "at least 1",
             });
         };
@@ -228,12 +254,13 @@ impl CodebookPlanner {
         })
     }
 
-    /// Most strata of a round: three quarters of all in the first, so that later ones find room for strata of what they have met.
-    fn strata_of(&self, round: usize) -> usize {
-        let later = self.strata / 4;
-        match self.rounds {
-            1 => self.strata,
-            rounds => self.strata - later + (later * round).div_ceil(rounds - 1),
+    /// What is not set, by whether a step of a belief takes little time.
+    fn size(&self, light: bool) -> Size {
+        let or = |set: Option<usize>, quick, slow| set.unwrap_or(if light { quick } else { slow });
+        Size {
+            strata: or(self.strata, 120, 40),
+            rounds: or(self.rounds, 3, 2),
+            refined: or(self.refined, 4000, 1000),
         }
     }
 

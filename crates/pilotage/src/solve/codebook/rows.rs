@@ -115,7 +115,7 @@ impl Rows {
         (codebook, shapes): (&Codebook, &[K::Full]),
         grid: Grid,
         met: &[Met<K::Full>],
-        settings: &CodebookPlanner,
+        (most, readings): (usize, usize),
         earlier: Option<Self>,
     ) -> Self {
         let reader = Reader {
@@ -124,7 +124,7 @@ impl Rows {
         };
         let actions = keeping.actions();
         let (points, states) = (grid.len(), codebook.len() * grid.len());
-        let refined = refined::<K>(&reader, met, settings.refined);
+        let refined = refined::<K>(&reader, met, most);
         let of_state = |state: usize| -> Option<Vec<Row>> {
             let known = |earlier: &Self| {
                 let inside = state * actions < earlier.rows.len();
@@ -145,7 +145,7 @@ impl Rows {
                 }
             };
             let of_action = |action: usize| {
-                let of = |full: &K::Full| reader.row(keeping, full, action, settings.readings);
+                let of = |full: &K::Full| reader.row(keeping, full, action, readings);
                 match fulls.as_slice() {
                     [full] => of(full),
                     fulls => averaged(&fulls.iter().map(of).collect::<Vec<_>>()),

@@ -47,9 +47,9 @@ const KEPT: usize = 3;
 /// A round that gains no more than this share of what is earned is a quiet one.
 const GAIN: f64 = 2e-3;
 
-/// Beliefs judged in a round of imitation for each episode, where the policy reads them, and where it is asked in full, which takes far
-/// longer.
-const READ: f64 = 20.0;
+/// Beliefs judged in a round of imitation for each episode, and where these are cells about which the policy is asked in full, which takes
+/// far longer.
+const JUDGED: f64 = 20.0;
 const IN_FULL: f64 = 1.5;
 
 /// Beliefs in a round of improvement, and steps, for each episode.
@@ -213,10 +213,8 @@ impl Search<'_> {
     fn imitate(&self, trials: &mut Trials) {
         let length = self.space.model().episode.length;
         let start = self.bare.updater.start();
-        let most = self.times(match self.policy.values_in_full(&start) {
-            Some(_) => IN_FULL,
-            None => READ,
-        });
+        let in_full = start.cells().is_some() && self.policy.values_in_full(&start).is_some();
+        let most = self.times(if in_full { IN_FULL } else { JUDGED });
         let mut collected = Collected::new(self.space, &self.bare);
         let mut tree: Option<Automaton> = None;
         for round in 0..IMITATING {
