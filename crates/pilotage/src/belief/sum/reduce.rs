@@ -245,10 +245,9 @@ impl Pairs<'_> {
                 self.best[i].1 -= 1;
             }
             // To those before it, what has grown may have come nearer.
-            if i < one && !self.on_a_line() && components[i].mode == components[one].mode {
-                if let Some(cost) = self.cost(components, (i, one), self.best[i].0) {
-                    self.best[i] = (cost, one);
-                }
+            let may = i < one && !self.on_a_line() && components[i].mode == components[one].mode;
+            if may && let Some(cost) = self.cost(components, (i, one), self.best[i].0) {
+                self.best[i] = (cost, one);
             }
         }
     }
