@@ -232,6 +232,25 @@ fn what_cannot_be_done_is_one_message() {
         "--out",
         &at("tiger.json"),
     ]);
+    let cells = at("cells.json");
+    printed(&[
+        "solve",
+        "n-maze",
+        "--set",
+        "beliefs=2",
+        "--set",
+        "rounds=1",
+        "--set",
+        "bins=2",
+        "--runs",
+        "5",
+        "--nodes",
+        "2",
+        "--episodes",
+        "5",
+        "--out",
+        &cells,
+    ]);
     let rows: &[(&[&str], &str)] = &[
         (&["check", &at("missing.toml")], "missing.toml"),
         (&["check", &at("bytes.toml")], "bytes.toml"),
@@ -329,6 +348,10 @@ fn what_cannot_be_done_is_one_message() {
                 "--wake-up",
             ],
             "start",
+        ),
+        (
+            &["simulate", "n-maze", "--policy", &cells, "--wake-up"],
+            "without --wake-up",
         ),
         (&["draw", &at("missing.json")], "missing.json"),
     ];
