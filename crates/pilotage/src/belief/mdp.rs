@@ -91,10 +91,7 @@ impl BeliefMdp {
         };
         let walls = (model.belief.walls == WallBelief::Clip).then(|| Barriers::new(model));
         let read = |effect: Effect| match (&walls, reading) {
-            (Some(walls), Reading::Clipped) => Some(Effect {
-                region: walls.reached(&effect.region)?,
-                ..effect
-            }),
+            (Some(walls), Reading::Clipped) => walls.felt(effect),
             _ => Some(effect),
         };
         Self {

@@ -1,6 +1,6 @@
 //! What stops motion: the bounds of the world, and the walls of its map where there is one.
 
-use super::{Interval, Map, Model, Region};
+use super::{Effect, Interval, Map, Model, Region};
 
 /// The walls of a world. The true state stops at them, and so does a belief that knows of them.
 ///
@@ -55,6 +55,12 @@ impl Barriers {
         };
         let sides: Option<_> = region.sides.iter().map(pushed).collect();
         Some(Region::new(sides?))
+    }
+
+    /// An effect whose region is [`Barriers::reached`].
+    pub(crate) fn felt(&self, effect: Effect) -> Option<Effect> {
+        let region = self.reached(&effect.region)?;
+        Some(Effect { region, ..effect })
     }
 
     /// Replaces what the map draws; returns how many variables that are.

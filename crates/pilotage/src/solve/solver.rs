@@ -23,10 +23,10 @@ pub trait Planner: Send + Sync {
     /// [`Error::Unsupported`] with the reason, and what would do.
     fn accepts(&self, model: &Model) -> Result<()>;
 
-    /// Whether it is one to try first for a model that it accepts: it finds something good in a minute or two. Who plans on uncertainty
-    /// levels is not where the model asks for more.
+    /// Whether it is one to try first for a model that it accepts: it finds something good in a minute or two.
     fn suits(&self, model: &Model) -> bool {
-        !self.needs_levels() || model.tracker() == TrackerKind::Linear
+        let _ = model;
+        true
     }
 
     /// Whether it plans on the uncertainty levels of a linear model; one that does not is handed models of any kind.
@@ -122,10 +122,14 @@ impl Solver {
         }
     }
 
-    /// Whether it is one to try first for a model that it accepts.
+    /// Whether it is one to try first for a model that it accepts. Who plans on uncertainty levels is not where the model asks for another
+    /// tracker.
     pub fn suits(&self, model: &Model) -> bool {
         match self {
-            Self::Planner(planner) => planner.suits(model),
+            Self::Planner(planner) => {
+                let levels = model.tracker() == TrackerKind::Linear;
+                (levels || !planner.needs_levels()) && planner.suits(model)
+            }
             Self::Learner(_) => false,
         }
     }

@@ -28,8 +28,7 @@ use reduce::{Likeness, normalise};
 use super::full::{Acted, Keeping, Moments, Sensed};
 use super::reading::Reading;
 use crate::model::{
-    ActionId, Doing, Dynamics, Effect, EffectTable, Interval, ModeId, Model, StartShape,
-    VariableKind,
+    ActionId, Doing, Dynamics, EffectTable, Interval, ModeId, Model, StartShape, VariableKind,
 };
 
 /// A sum of Gaussians.
@@ -126,13 +125,7 @@ impl SumKeeping {
             posterior: (1..=n).map(posterior_rule).collect(),
             bounds: walled.map(|walls| walls.bounds.clone()),
             effects: EffectTable::new(model, |effects| match dynamics.walls() {
-                Some(walls) => effects
-                    .into_iter()
-                    .filter_map(|effect| {
-                        let region = walls.reached(&effect.region)?;
-                        Some(Effect { region, ..effect })
-                    })
-                    .collect(),
+                Some(walls) => effects.into_iter().filter_map(|e| walls.felt(e)).collect(),
                 None => effects,
             }),
             model: model.clone(),

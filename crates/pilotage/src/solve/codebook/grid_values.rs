@@ -14,7 +14,6 @@ pub struct GridValues {
     codebook: Arc<Codebook>,
     /// By action and stratum: a value for every point of the grid.
     values: Vec<Vec<f64>>,
-    strata: usize,
     actions: usize,
 }
 
@@ -33,7 +32,6 @@ impl GridValues {
                 .collect(),
             grid,
             codebook,
-            strata,
             actions,
         }
     }
@@ -44,7 +42,7 @@ impl GridValues {
         let around = self.grid.around(&moments.mean);
         let value = |action: usize| -> f64 {
             let of = |&(stratum, weight): &(usize, f64)| {
-                let values = &self.values[action * self.strata + stratum];
+                let values = self.of(action, stratum);
                 let points = around.iter();
                 weight
                     * points
@@ -56,12 +54,19 @@ impl GridValues {
         (0..self.actions).map(value).collect()
     }
 
+    /// Values of an action in a stratum, by point.
+    fn of(&self, action: ActionId, stratum: usize) -> &[f64] {
+        let strata = self.codebook.len();
+        &self.values[action * strata + stratum.min(strata - 1)]
+    }
+
+    fn worth(&self, belief: &Belief, action: ActionId) -> f64 {
+        let values = self.of(action, belief.stratum);
+        self.grid.interpolate(values, &belief.mean)
+    }
+
     fn best(&self, belief: &Belief) -> (ActionId, f64) {
-        let stratum = belief.stratum.min(self.strata - 1);
-        let value = |action: usize| {
-            let values = &self.values[action * self.strata + stratum];
-            self.grid.interpolate(values, &belief.mean)
-        };
+        let value = |action| self.worth(belief, action);
         let better = |best: (ActionId, f64), action| match value(action) {
             value if value > best.1 => (action, value),
             _ => best,
@@ -76,8 +81,7 @@ impl Policy for GridValues {
     }
 
     fn action_value(&self, belief: &Belief, action: ActionId) -> Option<f64> {
-        let values = &self.values[action * self.strata + belief.stratum.min(self.strata - 1)];
-        Some(self.grid.interpolate(values, &belief.mean))
+        Some(self.worth(belief, action))
     }
 
     fn action_in_full(&self, held: &Held) -> ActionId {

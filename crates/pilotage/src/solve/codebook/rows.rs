@@ -108,8 +108,8 @@ fn averaged(rows: &[Row]) -> Row {
 }
 
 impl Rows {
-    /// The rows of a codebook, whose strata have the shapes of beliefs in full, refined on beliefs that were met. Earlier rows on the same grid are taken over where nothing was or is
-    /// refined: strata stay what they are when others join them.
+    /// The rows of a codebook, whose strata have the shapes of beliefs in full, refined on beliefs that were met. Earlier rows on the same
+    /// grid are taken over where nothing was or is refined: strata stay what they are when others join them.
     pub(super) fn new<K: Keeping>(
         (keeping, coarse): (&K, &K),
         (codebook, shapes): (&Codebook, &[K::Full]),

@@ -17,7 +17,7 @@ use super::refusals;
 use super::settings;
 use super::solver::{Plan, Planner, Problem, refuse_if};
 use crate::error::Result;
-use crate::model::{Model, TrackerKind};
+use crate::model::Model;
 use crate::progress::Progress;
 
 /// Name of the solver in errors and policies.
@@ -53,7 +53,7 @@ impl Planner for ValueIteration {
 
     /// A level has one mode, which is not so where it changes at a place and the belief is not sure of being there.
     fn suits(&self, model: &Model) -> bool {
-        model.tracker() == TrackerKind::Linear && !refusals::guesses_modes(model)
+        !refusals::guesses_modes(model)
     }
 
     fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
