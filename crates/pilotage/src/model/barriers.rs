@@ -12,6 +12,14 @@ pub(crate) struct Barriers {
     pub(crate) map: Option<Map>,
 }
 
+/// A place along a variable where the way is stopped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Stop {
+    pub(crate) place: f64,
+    /// Whether it is the way up that ends there, or the way down.
+    pub(crate) upwards: bool,
+}
+
 impl Barriers {
     /// The walls of a model's world.
     pub(crate) fn new(model: &Model) -> Self {
@@ -31,6 +39,21 @@ impl Barriers {
     pub(crate) fn confine(&self, point: &mut [f64]) {
         let drawn = self.on_map(point, Map::nearest_free);
         self.clamp(point, drawn);
+    }
+
+    /// Where the way along a variable is stopped, somewhere in the world, each once.
+    pub(crate) fn stops(&self, variable: usize) -> Vec<Stop> {
+        match &self.map {
+            Some(map) if variable < 2 => map.stops(variable),
+            _ => {
+                let bounds = self.bounds[variable];
+                let ends = [(bounds.low, false), (bounds.high, true)].into_iter();
+                let finite = ends.filter(|(place, _)| place.is_finite());
+                finite
+                    .map(|(place, upwards)| Stop { place, upwards })
+                    .collect()
+            }
+        }
     }
 
     /// A region as a Gaussian is asked about it: sides that touch the bounds are pushed outwards for ever, since what a Gaussian has beyond a

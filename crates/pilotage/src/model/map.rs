@@ -2,6 +2,7 @@
 
 mod drawing;
 
+use super::barriers::Stop;
 use super::{Interval, Region};
 pub(crate) use drawing::draw;
 
@@ -156,6 +157,32 @@ impl Map {
         to
     }
 
+    /// Where the way along an axis is stopped, each place once for either direction.
+    pub(crate) fn stops(&self, axis: usize) -> Vec<Stop> {
+        let count = [self.grid.columns, self.grid.rows];
+        let stopped = |edge: i64, upwards: bool| {
+            let mut across = 0..count[1 - axis];
+            across.any(|other| {
+                let cell = |along: i64| match axis {
+                    0 => [along, other],
+                    _ => [other, along],
+                };
+                let (from, to) = match upwards {
+                    true => (cell(edge - 1), cell(edge)),
+                    false => (cell(edge), cell(edge - 1)),
+                };
+                self.grid.open(from) && !self.grid.passable(from, to, axis)
+            })
+        };
+        let edges = (0..=count[axis]).flat_map(|edge| [(edge, false), (edge, true)]);
+        let stops = edges.filter(|(edge, upwards)| stopped(*edge, *upwards));
+        let stop = |(edge, upwards)| Stop {
+            place: self.edge(edge),
+            upwards,
+        };
+        stops.map(stop).collect()
+    }
+
     /// Share of the way at which it leaves the cell along one axis; infinite if it does not.
     fn share_to_edge(&self, from: f64, delta: f64, cell: i64, target: i64) -> f64 {
         match target.cmp(&cell) {
@@ -212,5 +239,42 @@ impl Map {
 
     fn edge(&self, index: i64) -> f64 {
         index as f64 * self.cell
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::random::{Role, stream, uniform};
+
+    /// Wherever a way is stopped, there is a stop at that place.
+    #[test]
+    fn ways_end_at_stops() {
+        let text = crate::scenario::builtin("u-maze").unwrap();
+        let model = crate::scenario::read(text, "u-maze").unwrap().model;
+        let map = model.map.unwrap();
+        let stops = [0, 1].map(|axis| map.stops(axis));
+        let mut rng = stream(1, 0, Role::World);
+        let mut met = [vec![false; stops[0].len()], vec![false; stops[1].len()]];
+        for _ in 0..20_000 {
+            let mut point = || [0, 1].map(|_| 7.0 * uniform(&mut rng) - 1.0);
+            let (from, to) = (map.nearest_free(point()), point());
+            let end = map.travel(from, to);
+            let cut = |axis: usize| end[axis] != to[axis];
+            let at = |axis: usize| {
+                stops[axis].iter().position(|stop| {
+                    let near = (stop.place - end[axis]).abs() < 1e-9;
+                    near && stop.upwards == (to[axis] > from[axis])
+                })
+            };
+            if let Some(axis) = [0, 1]
+                .into_iter()
+                .find(|axis| cut(*axis) && at(*axis).is_some())
+            {
+                met[axis][at(axis).unwrap()] = true;
+            } else {
+                assert_eq!(end, to, "{from:?}");
+            }
+        }
+        assert!(met.iter().flatten().all(|met| *met), "{stops:?} {met:?}");
     }
 }

@@ -33,7 +33,7 @@ use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub(crate) use barriers::Barriers;
+pub(crate) use barriers::{Barriers, Stop};
 pub use builder::{Clause, ModelBuilder};
 pub(crate) use dynamics::wrapped;
 pub use dynamics::{Doing, Dynamics};

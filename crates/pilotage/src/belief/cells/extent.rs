@@ -19,8 +19,8 @@ const WITHIN: [f64; 2] = [8.0, 2.0];
 /// Where a variable has no bound, cells go so many standard deviations beyond every start.
 const SPREAD: f64 = 5.0;
 
-/// A bound so many times farther from the middle of all that is within reach than the end of that is as good as none: cells out to it would
-/// be coarse where it matters.
+/// A bound so many times farther from the middle of all that is within reach than the end of that is far: cells of one width out to it would
+/// be coarse where it matters, and so they grow.
 const FAR: f64 = 3.0;
 
 /// Where bounds are no walls, cells go on beyond them for at most this share of their width, for one and for two variables.
@@ -32,7 +32,8 @@ const STEPS: f64 = 10.0;
 /// The cells of a model: between the bounds of each variable, and beyond them as far as the controls lead in ten steps if they are no
 /// walls to the belief, at most half of their width for one variable and a quarter for two. Where there is no bound, or one three times
 /// farther out than anything else, they reach from the starts (5 standard deviations) and the places of which rewards and events speak as
-/// far as the controls lead from the starts in ten steps, three standard deviations of that many steps' noise included. Whole numbers have
+/// far as actions lead from the starts in ten steps, three standard deviations of that many steps' noise included; from there to the
+/// bound each is a tenth wider than the one before. Walls have a thin cell of their own on the side on which one stands. Whole numbers have
 /// a cell each, squares of a map whole cells, and up to a quarter more cells are taken if controls then lead across whole ones.
 pub(super) fn grid(model: &Model, dynamics: &Dynamics) -> Result<Grid> {
     let n = model.state_dim();
@@ -49,7 +50,7 @@ pub(super) fn grid(model: &Model, dynamics: &Dynamics) -> Result<Grid> {
         None => enough(model, dynamics, variable),
     };
     let axes: Vec<Axis> = (0..n).map(|i| axis(model, dynamics, i, count(i))).collect();
-    let all = axes.iter().map(|axis| axis.count as f64).product::<f64>();
+    let all = axes.iter().map(|axis| axis.count() as f64).product::<f64>();
     if all > MOST as f64 || all.is_nan() {
         return Err(unsupported(
             model,
@@ -87,11 +88,19 @@ fn axis(model: &Model, dynamics: &Dynamics, variable: usize, count: usize) -> Ax
         VariableKind::Angle => [0, 0],
         _ => beyond(model, dynamics, variable, extent).map(|by| (by / width).ceil() as usize),
     };
-    Axis {
-        low: low - beyond[0] as f64 * width,
+    let axis = Axis::new(
+        low - beyond[0] as f64 * width,
         width,
-        count: count + beyond[0] + beyond[1],
+        count + beyond[0] + beyond[1],
         kind,
+    );
+    if kind != VariableKind::Real {
+        return axis;
+    }
+    let axis = axis.grown_to(model.state[variable].bounds);
+    match dynamics.walls() {
+        Some(walls) => axis.with_stops(&walls.stops(variable)),
+        None => axis,
     }
 }
 
@@ -224,16 +233,18 @@ fn reach(model: &Model, dynamics: &Dynamics, variable: usize) -> f64 {
     moves(model, dynamics).map(reach).fold(0.0, f64::max)
 }
 
-/// Where every action leads from the mean of every start, and with which noise.
+/// Where every action leads from the mean of every start, in every mode, and with which noise.
 fn moves<'a>(
     model: &'a Model,
     dynamics: &'a Dynamics,
 ) -> impl Iterator<Item = (Vec<f64>, Vec<f64>, Vec<f64>)> + 'a {
     let n = model.state_dim();
+    let ways = (0..model.modes.len())
+        .flat_map(|mode| (0..model.actions.len()).map(move |action| (mode, action)));
     let of = move |start: &'a StartHypothesis| {
-        (0..model.actions.len()).map(move |action| {
+        ways.clone().map(move |(mode, action)| {
             let doing = Doing {
-                mode: start.mode,
+                mode,
                 action,
                 step: 0,
             };

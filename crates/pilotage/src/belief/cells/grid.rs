@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::belief::gaussian::{normal_cdf, normal_density};
-use crate::model::{Interval, VariableKind};
+use crate::model::{Interval, Stop, VariableKind};
 
 /// A point of one or two variables; the second counts only where there is one.
 pub(crate) type Spot = [f64; 2];
@@ -14,13 +14,34 @@ const NEVER: f64 = 6.5;
 /// Of two correlated variables the first is cut into at most so many strips a cell, each with its own law of the second.
 const STRIPS: f64 = 8.0;
 
-/// One variable, cut into cells of one width.
+/// Where cells grow, each is so many times as wide as the one before.
+const GROWTH: f64 = 1.1;
+
+/// Where walls stop what moves, a cell of its own is this share of the usual width: who stands at a wall is neither somewhere beside it nor
+/// does he get along it.
+const THIN: f64 = 0.01;
+
+/// One variable, cut into cells of one width; thin ones are at walls, wider ones far out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Axis {
-    pub(super) low: f64,
+    /// Ends of the cells, one after the other: one more than there are cells.
+    edges: Vec<f64>,
+    /// Of a usual cell, and of those that one may think of beyond all.
     pub(super) width: f64,
-    pub(super) count: usize,
     pub(super) kind: VariableKind,
+}
+
+/// Ends of cells that grow from a width until they have come so far; none if that is not far, or for ever.
+fn growing(width: f64, far: f64) -> Vec<f64> {
+    if far <= 1e-9 * width || far.is_infinite() {
+        return Vec::new();
+    }
+    let ends = |reach: &f64| Some(GROWTH * reach + width);
+    let mut ends: Vec<f64> = std::iter::successors(Some(width), ends)
+        .take_while(|reach| *reach < far - 0.5 * width)
+        .collect();
+    ends.push(far);
+    ends
 }
 
 /// The sum of a uniform number between two ends and Gaussian noise: where the points of a cell are after a step, or what they make a
@@ -93,19 +114,67 @@ pub(crate) struct Part {
 }
 
 impl Axis {
-    fn edge(&self, index: i64) -> f64 {
-        self.low + index as f64 * self.width
+    pub(super) fn new(low: f64, width: f64, count: usize, kind: VariableKind) -> Self {
+        let edges = (0..=count).map(|k| low + k as f64 * width).collect();
+        Self { edges, width, kind }
     }
 
-    /// The middle of a cell, which may lie beyond the grid.
+    /// With cells that reach to far bounds, each wider than the one before.
+    pub(super) fn grown_to(mut self, bounds: Interval) -> Self {
+        let (low, high) = (self.edges[0], self.edges[self.count()]);
+        let upwards = growing(self.width, bounds.high - high);
+        self.edges.extend(upwards.into_iter().map(|by| high + by));
+        let downwards = growing(self.width, low - bounds.low);
+        let below = downwards.into_iter().rev().map(|by| low - by);
+        self.edges.splice(0..0, below);
+        self
+    }
+
+    /// With a thin cell on that side of each of these places from which one comes to it.
+    pub(super) fn with_stops(mut self, stops: &[Stop]) -> Self {
+        let thin = THIN * self.width;
+        let (low, high) = (self.edges[0], self.edges[self.count()]);
+        for stop in stops {
+            let beside = if stop.upwards { -thin } else { thin };
+            let ends = [stop.place, stop.place + beside];
+            let inside = ends.into_iter().filter(|end| (low..=high).contains(end));
+            self.edges.extend(inside);
+        }
+        self.edges.sort_by(f64::total_cmp);
+        self.edges.dedup_by(|a, b| *a - *b < 0.5 * thin);
+        self
+    }
+
+    /// Number of cells.
+    pub(super) fn count(&self) -> usize {
+        self.edges.len() - 1
+    }
+
+    fn edge(&self, index: i64) -> f64 {
+        let last = self.count() as i64;
+        let inside = index.clamp(0, last);
+        self.edges[inside as usize] + (index - inside) as f64 * self.width
+    }
+
+    /// The cell of a value, which may lie beyond the axis.
+    fn index(&self, value: f64) -> i64 {
+        let last = self.count();
+        let beyond = |end: f64| ((value - end) / self.width).floor() as i64;
+        match self.edges.partition_point(|edge| *edge <= value) {
+            0 => beyond(self.edges[0]),
+            passed if passed > last => last as i64 + beyond(self.edges[last]),
+            passed => passed as i64 - 1,
+        }
+    }
+
+    /// The middle of a cell, which may lie beyond the axis.
     pub(super) fn middle(&self, index: i64) -> f64 {
-        self.edge(index) + 0.5 * self.width
+        0.5 * (self.edge(index) + self.edge(index + 1))
     }
 
     /// The cell of a value, one of those at the ends for a value beyond them.
     pub(super) fn cell_of(&self, value: f64) -> usize {
-        let index = ((value - self.low) / self.width).floor();
-        (index.max(0.0) as usize).min(self.count - 1)
+        (self.index(value).max(0) as usize).min(self.count() - 1)
     }
 
     /// Whether values are whole numbers, one for each cell.
@@ -113,17 +182,12 @@ impl Axis {
         self.kind == VariableKind::Integer
     }
 
-    fn half(&self) -> f64 {
+    fn half(&self, index: i64) -> f64 {
         if self.is_integer() {
             0.0
         } else {
-            0.5 * self.width
+            0.5 * (self.edge(index + 1) - self.edge(index))
         }
-    }
-
-    /// Variance of a value of which only the cell is known.
-    pub(super) fn within(&self) -> f64 {
-        self.half().powi(2) / 3.0
     }
 
     /// How much of a ramp lies in each cell of a range, as far as it lies in `kept`. The cells at the ends of the range have
@@ -132,10 +196,7 @@ impl Axis {
         if self.kind == VariableKind::Angle {
             return self.masses_around(ramp, kept);
         }
-        let index = |value: f64| {
-            let index = ((value - self.low) / self.width).floor();
-            (index as i64).clamp(range.start, range.end - 1)
-        };
+        let index = |value: f64| self.index(value).clamp(range.start, range.end - 1);
         let reach = NEVER * ramp.sd;
         let (first, last) = (index(ramp.low - reach), index(ramp.high + reach));
         let edge = |k: i64| match k {
@@ -159,7 +220,7 @@ impl Axis {
     fn masses_around(&self, ramp: Ramp, kept: Interval) -> Vec<(i64, f64)> {
         use std::f64::consts::TAU;
         let ramp = ramp.moved(crate::model::wrapped(ramp.middle()) - ramp.middle());
-        let mut masses = vec![0.0; self.count];
+        let mut masses = vec![0.0; self.count()];
         for turns in [-1.0, 0.0, 1.0] {
             let ramp = ramp.moved(turns * TAU);
             let below = |k: i64| ramp.below(self.edge(k).clamp(kept.low, kept.high));
@@ -173,10 +234,16 @@ impl Axis {
     }
 
     fn strips(&self, per: usize) -> Self {
+        let fine = |k: usize| {
+            let (low, high) = (self.edges[k], self.edges[k + 1]);
+            (0..per).map(move |i| low + i as f64 / per as f64 * (high - low))
+        };
+        let mut edges: Vec<f64> = (0..self.count()).flat_map(fine).collect();
+        edges.push(self.edges[self.count()]);
         Self {
+            edges,
             width: self.width / per as f64,
-            count: self.count * per,
-            ..self.clone()
+            kind: self.kind,
         }
     }
 }
@@ -190,7 +257,7 @@ pub(crate) struct Grid {
 impl Grid {
     /// Number of cells.
     pub(crate) fn count(&self) -> usize {
-        self.axes.iter().map(|axis| axis.count).product()
+        self.axes.iter().map(Axis::count).product()
     }
 
     pub(super) fn dim(&self) -> usize {
@@ -199,7 +266,7 @@ impl Grid {
 
     fn indices(&self, cell: usize) -> [usize; 2] {
         match self.axes.get(1) {
-            Some(axis) => [cell / axis.count, cell % axis.count],
+            Some(axis) => [cell / axis.count(), cell % axis.count()],
             None => [cell, 0],
         }
     }
@@ -207,7 +274,7 @@ impl Grid {
     fn index(&self, [first, second]: [usize; 2]) -> usize {
         self.axes
             .get(1)
-            .map_or(first, |axis| first * axis.count + second)
+            .map_or(first, |axis| first * axis.count() + second)
     }
 
     /// The middle of a cell.
@@ -231,9 +298,10 @@ impl Grid {
 
     /// A whole cell.
     pub(crate) fn whole(&self, cell: usize) -> Part {
+        let indices = self.indices(cell);
         let mut half = [0.0; 2];
         for (i, axis) in self.axes.iter().enumerate() {
-            half[i] = axis.half();
+            half[i] = axis.half(indices[i] as i64);
         }
         Part {
             middle: self.middle(cell),
@@ -296,7 +364,7 @@ impl Grid {
         let per = shear.ceil().clamp(1.0, STRIPS) as usize;
         let strips = self.axes[0].strips(per);
         let sheared = (slope * strips.width).powi(2) / 12.0;
-        let (fine, count) = (per as i64, self.axes[0].count as i64);
+        let (fine, count) = (per as i64, self.axes[0].count() as i64);
         let all = (ranges[0].start - count) * fine..(ranges[0].end + count) * fine;
         for (k, mass) in strips.masses(ramps[0], kept[0], all) {
             let by = slope * (strips.middle(k) - centre);
@@ -313,13 +381,13 @@ impl Grid {
 
     /// The ranges of the grid itself.
     pub(super) fn own_ranges(&self) -> Vec<Range<i64>> {
-        let ranges = self.axes.iter().map(|axis| 0..axis.count as i64);
+        let ranges = self.axes.iter().map(|axis| 0..axis.count() as i64);
         ranges.collect()
     }
 
     /// Ranges as wide again on either side, for ways that end beyond the grid.
     pub(super) fn wide_ranges(&self) -> Vec<Range<i64>> {
-        let wide = |axis: &Axis| -(axis.count as i64)..2 * axis.count as i64;
+        let wide = |axis: &Axis| -(axis.count() as i64)..2 * axis.count() as i64;
         self.axes.iter().map(wide).collect()
     }
 

@@ -101,8 +101,8 @@ impl CellsKeeping {
     /// quarter more if controls then lead across whole cells. They lie between the bounds, and beyond them as far as the controls lead in
     /// ten steps if they are no walls to the belief (at most half of their width for one variable and a quarter for two). Where there is
     /// no bound, or one three times farther out than anything else, they reach from the starts (5 standard deviations) and the places of
-    /// which rewards and events speak as far as the controls lead from the starts in ten steps. Whole numbers have a cell each, angles the
-    /// full circle, and squares of a map a whole number of cells.
+    /// which rewards and events speak as far as actions lead from the starts in ten steps, and from there grow by a tenth each. Walls have
+    /// thin cells of their own, whole numbers a cell each, angles the full circle, and squares of a map a whole number of cells.
     ///
     /// # Errors
     /// [`Error::Unsupported`] for other models, with the reason and what would do.

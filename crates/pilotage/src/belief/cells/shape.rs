@@ -1,6 +1,6 @@
 //! Cells as other things: evenly spread readings, moments, Gaussians, and beliefs moved elsewhere.
 
-use super::grid::Ramp;
+use super::grid::{Part, Ramp};
 use super::sensing::Heard;
 use super::{Cells, CellsKeeping};
 use crate::belief::full::{Moments, Sensed};
@@ -99,18 +99,18 @@ impl CellsKeeping {
         let met = || {
             let states = full.mass.iter().enumerate();
             let met = states.filter(|(_, mass)| **mass > 0.0);
-            met.map(|(state, mass)| (self.grid.middle(state % count), *mass))
+            met.map(|(state, mass)| (self.grid.whole(state % count), *mass))
         };
         let mut mean = [0.0; 2];
         for (i, axis) in self.grid.axes.iter().enumerate() {
             mean[i] = match axis.kind {
                 VariableKind::Angle => {
                     let along = |part: fn(f64) -> f64| -> f64 {
-                        met().map(|(at, mass)| mass * part(at[i])).sum()
+                        met().map(|(at, mass)| mass * part(at.middle[i])).sum()
                     };
                     along(f64::sin).atan2(along(f64::cos))
                 }
-                _ => met().map(|(at, mass)| mass * at[i]).sum(),
+                _ => met().map(|(at, mass)| mass * at.middle[i]).sum(),
             };
         }
         let apart = |at: f64, i: usize| match self.grid.axes[i].kind {
@@ -118,15 +118,15 @@ impl CellsKeeping {
             _ => at - mean[i],
         };
         let shared = |i: usize, j: usize| -> f64 {
-            let within = if i == j {
-                self.grid.axes[i].within()
-            } else {
-                0.0
+            let of = |(at, mass): (Part, f64)| {
+                // Of a state only the cell is known.
+                let within = match i == j {
+                    true => at.half[i] * at.half[i] / 3.0,
+                    false => 0.0,
+                };
+                mass * (apart(at.middle[i], i) * apart(at.middle[j], j) + within)
             };
-            let sum: f64 = met()
-                .map(|(at, mass)| mass * apart(at[i], i) * apart(at[j], j))
-                .sum();
-            sum + within
+            met().map(of).sum()
         };
         let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
         let covariance: Vec<f64> = entries.map(|(i, j)| shared(i, j)).collect();

@@ -1,7 +1,7 @@
 use super::*;
 use crate::belief::KalmanFilter;
 use crate::belief::full::Keeping;
-use crate::model::{BeliefSettings, Clause, Formula, ModelBuilder, Then};
+use crate::model::{BeliefSettings, Clause, Formula, Interval, ModelBuilder, Then, WallBelief};
 use nalgebra::{DMatrix, DVector};
 
 fn hallway(cells: Option<usize>) -> Model {
@@ -281,4 +281,59 @@ fn whole_numbers_and_signals_are_exact() {
     assert!((readings[0].0 - high).abs() < 1e-12 && readings.len() == 2);
     keeping.sense(&mut full, 0, 0, Reading::Symbol(0));
     assert!((full.mass[3] - 0.35 / high).abs() < 1e-12);
+}
+
+/// Bounds far beyond all that a few steps reach are coarse, and still there.
+#[test]
+fn cells_follow_what_drifts_to_a_far_bound() {
+    let mut model = hallway(None);
+    model.state[0].bounds = Interval::new(-200.0, 300.0);
+    model.motion.a[(0, 0)] = 1.0;
+    let keeping = CellsKeeping::new(&model).unwrap();
+    assert!(keeping.cells() < 400, "{}", keeping.cells());
+    let mut full = keeping.start();
+    for step in 0..250 {
+        keeping.act(&mut full, 0, step);
+        let moments = moments(&keeping, &full);
+        let expected = 0.3 + (step + 1) as f64;
+        assert!(
+            (moments.mean[0] - expected).abs() < 0.1 * expected.max(10.0),
+            "{step}: {moments:?}"
+        );
+    }
+}
+
+/// Who was stopped at a wall stands there exactly, and starts from there.
+#[test]
+fn who_is_stopped_at_a_wall_starts_from_it() {
+    let mut model = hallway(None);
+    model.state[0].bounds = Interval::new(0.0, 4.0);
+    model.motion.a[(0, 0)] = 1.0;
+    model.motion.b[(0, 0)] = 0.25;
+    model.belief.walls = WallBelief::Clip;
+    let keeping = CellsKeeping::new(&model).unwrap();
+    // All at the east wall, and then back: half of what noise adds to a step of -0.25 is stopped there again.
+    let mut full = keeping.start();
+    for step in 0..200 {
+        keeping.act(&mut full, 0, step);
+    }
+    let stationary = |mut x: f64| {
+        // The same by drawing: a reflected walk that is held at the wall.
+        let mut rng = crate::random::stream(1, 0, crate::random::Role::World);
+        let (mut at_wall, mut mean) = (0.0, 0.0);
+        let steps = 400_000;
+        for _ in 0..steps {
+            let noise = 0.1f64.sqrt() * crate::random::normal(&mut rng);
+            x = (x + 0.25 + noise).clamp(0.0, 4.0);
+            at_wall += f64::from(x == 4.0) / f64::from(steps);
+            mean += x / f64::from(steps);
+        }
+        (at_wall, mean)
+    };
+    let (at_wall, mean) = stationary(4.0);
+    let moments = moments(&keeping, &full);
+    // Ten standard errors of correlated draws.
+    assert!((moments.mean[0] - mean).abs() < 0.01, "{mean} {moments:?}");
+    let last = full.mass[keeping.cells() - 1];
+    assert!((last - at_wall).abs() < 0.02, "{last} {at_wall}");
 }
