@@ -76,8 +76,8 @@ pub fn policy_and_problem(
     let scenario = match problem {
         Some(problem) => scenario::find(problem)?,
         // A file says whose policy it is, not which other files are read.
-        None => match scenario::builtin(&automaton.problem) {
-            Some(text) => scenario::read(text, &automaton.problem)?,
+        None => match scenario::find_builtin(&automaton.problem) {
+            Some(scenario) => scenario?,
             None => {
                 return Err(Failure::Usage(format!(
                     "{origin}: this policy is for {}, which is not built in; give its model file with --problem",

@@ -20,7 +20,7 @@ use crate::summary;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Name of a built-in problem, or a model file.
+    /// Name of a built-in problem, or a model file; with @2 after it, the agent is told that it begins at its second start.
     problem: PathBuf,
     /// A policy file written by `pilotage solve --out`.
     #[arg(long)]

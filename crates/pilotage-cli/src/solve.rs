@@ -22,7 +22,8 @@ use crate::summary;
 #[derive(Args)]
 #[command(after_help = settings_of_solvers())]
 pub struct Arguments {
-    /// Name of a built-in problem (see `pilotage list`), or a model file.
+    /// Name of a built-in problem (see `pilotage list`), or a model file; with @2 after it, the agent is told that it begins at its second
+    /// start.
     problem: PathBuf,
     /// Solver to use (see `pilotage list`); default: the first planner that accepts the problem.
     #[arg(long, value_name = "SOLVER")]

@@ -33,8 +33,18 @@ struct Data {
 struct Problem {
     name: String,
     nodes: Vec<usize>,
+    /// Whether it is also solved for agents that are told their start.
+    #[serde(default)]
+    told: bool,
+    /// Digits behind the point of what is earned.
+    #[serde(default = "usual_digits")]
+    digits: usize,
     #[serde(default)]
     published: Vec<Published>,
+}
+
+fn usual_digits() -> usize {
+    3
 }
 
 #[derive(Deserialize)]
@@ -100,34 +110,19 @@ fn heading() -> String {
 
 /// Measures a problem in processes of its own.
 fn section(problem: &Problem) -> Result<String, Box<dyn Error>> {
-    let about = scenario::find(&problem.name)?.model.about;
-    let mut text = format!("\n## `{}`\n\n{about}\n\n", problem.name);
-    text += "| nodes at most | nodes | planner | planned | earned | rule of thumb | CPU seconds | MiB |\n|--:|--:|---|--:|--:|--:|--:|--:|\n";
+    let model = scenario::find(&problem.name)?.model;
+    let mut text = format!("\n## `{}`\n\n{}\n\n", problem.name, model.about);
+    text += HEAD;
     for most in &problem.nodes {
-        eprintln!("{}, at most {most} nodes", problem.name);
-        let program = std::env::current_exe()?;
-        let most = most.to_string();
-        let run = Command::new(program)
-            .args(["--one", &problem.name, &most])
-            .output()?;
-        if !run.status.success() {
-            return Err(
-                format!("{}: {}", problem.name, String::from_utf8_lossy(&run.stderr)).into(),
-            );
-        }
-        let row: Row = serde_json::from_slice(&run.stdout)?;
-        let estimate = |(mean, stderr): (f64, f64)| format!("{mean:.3} ± {stderr:.3}");
-        text += &format!(
-            "| {} | {} | {} | {:.3} | {} | {} | {} | {} |\n",
-            row.most,
-            row.nodes,
-            row.solver,
-            row.planned,
-            estimate(row.earned),
-            row.rule.map_or_else(|| "-".to_owned(), estimate),
-            whole(row.seconds),
-            whole(row.mebibytes),
-        );
+        text += &in_its_own_process(&problem.name, *most)?.line(problem.digits);
+    }
+    if problem.told {
+        let most = problem.nodes.iter().copied().max().unwrap_or(1);
+        let starts = 1..=model.start.len();
+        let rows: Result<Vec<Row>, _> = starts
+            .map(|start| in_its_own_process(&format!("{}@{start}", problem.name), most))
+            .collect();
+        text += &told(&rows?, problem.digits);
     }
     if !problem.published.is_empty() {
         text += "\n| published | return | source |\n|---|--:|---|\n";
@@ -136,6 +131,53 @@ fn section(problem: &Problem) -> Result<String, Box<dyn Error>> {
         text += &format!("| {who} | {value} | {source} |\n");
     }
     Ok(text)
+}
+
+/// Heads of the columns.
+const HEAD: &str = "| nodes at most | nodes | planner | planned | earned | rule of thumb | CPU seconds | MiB |\n|--:|--:|---|--:|--:|--:|--:|--:|\n";
+
+/// What agents earn that are told their start, each with a plan of its own.
+fn told(rows: &[Row], digits: usize) -> String {
+    let count = rows.len() as f64;
+    let mean = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).sum::<f64>() / count;
+    let variance = mean(&|row| row.earned.1.powi(2)) / count;
+    let lines: String = rows.iter().map(|row| row.line(digits)).collect();
+    format!(
+        "\nTold which start it is, one after the other; on average {:.digits$} is planned and {:.digits$} ± {:.digits$} earned:\n\n{HEAD}{lines}",
+        mean(&|row| row.planned),
+        mean(&|row| row.earned.0),
+        variance.sqrt(),
+    )
+}
+
+/// Measures a problem in a process of its own.
+fn in_its_own_process(name: &str, most: usize) -> Result<Row, Box<dyn Error>> {
+    eprintln!("{name}, at most {most} nodes");
+    let program = std::env::current_exe()?;
+    let run = Command::new(program)
+        .args(["--one", name, &most.to_string()])
+        .output()?;
+    if !run.status.success() {
+        return Err(format!("{name}: {}", String::from_utf8_lossy(&run.stderr)).into());
+    }
+    Ok(serde_json::from_slice(&run.stdout)?)
+}
+
+impl Row {
+    fn line(&self, digits: usize) -> String {
+        let estimate = |(mean, stderr): (f64, f64)| format!("{mean:.digits$} ± {stderr:.digits$}");
+        format!(
+            "| {} | {} | {} | {:.digits$} | {} | {} | {} | {} |\n",
+            self.most,
+            self.nodes,
+            self.solver,
+            self.planned,
+            estimate(self.earned),
+            self.rule.map_or_else(|| "-".to_owned(), estimate),
+            whole(self.seconds),
+            whole(self.mebibytes),
+        )
+    }
 }
 
 fn whole(number: Option<f64>) -> String {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::read::text_of;
 use super::{Scenario, load, read};
 use crate::error::is_unseen;
 use crate::model::{ModelError, nearest, suggest};
@@ -93,18 +94,27 @@ pub fn builtin(name: &str) -> Option<&'static str> {
         .map(|(_, text)| text)
 }
 
-/// Reads the built-in model of that name, or else the model file at that path.
+/// Between the name of a problem and the number of the start that the agent is told.
+pub(super) const TOLD: char = '@';
+
+/// Reads the built-in model of that name, or else the model file at that path. With `@2` after it, its agent is told that an episode
+/// begins at the second of its starts.
 ///
 /// # Errors
-/// If neither exists, with the nearest built-in name or model file as a hint, or if the file is not a valid model.
+/// If neither exists, with the nearest built-in name or model file as a hint, if the file is not a valid model, or has no such start.
 pub fn find(name_or_path: impl AsRef<Path>) -> Result<Scenario, ModelError> {
     let path = name_or_path.as_ref();
     let name = path.to_string_lossy();
-    if let Some(text) = builtin(&name) {
-        return read(text, &name);
+    if let Some(scenario) = find_builtin(&name) {
+        return scenario;
     }
     if path.exists() {
         return load(path);
+    }
+    if let Some((of, start)) = with_start(&name)
+        && Path::new(of).exists()
+    {
+        return told(&text_of(Path::new(of))?, start, of);
     }
     let meant = meant(path).map(|meant| format!("did you mean `{meant}`?"));
     if path.components().count() > 1 || path.extension().is_some() {
@@ -119,6 +129,36 @@ pub fn find(name_or_path: impl AsRef<Path>) -> Result<Scenario, ModelError> {
         place: None,
         message: "no built-in model and no file has this name".to_owned(),
         hint: meant.unwrap_or_else(|| suggest(&name, names())),
+    })
+}
+
+/// Reads the built-in model of that name, `@` and the number of a start after it or not; `None` if there is no such model.
+///
+/// # Errors
+/// If it has no such start.
+pub fn find_builtin(name: &str) -> Option<Result<Scenario, ModelError>> {
+    if let Some(text) = builtin(name) {
+        return Some(read(text, name));
+    }
+    let (of, start) = with_start(name)?;
+    Some(told(builtin(of)?, start, of))
+}
+
+/// A name with the number of a start.
+fn with_start(name: &str) -> Option<(&str, usize)> {
+    let (of, start) = name.rsplit_once(TOLD)?;
+    Some((of, start.parse().ok()?))
+}
+
+/// The problem of a text whose agent is told its start.
+fn told(text: &str, start: usize, origin: &str) -> Result<Scenario, ModelError> {
+    let name = read(text, origin)?.model.name;
+    // Before the first table of a file is room for a key like this one.
+    read(&format!("told = {start}\n{text}"), origin).map_err(|error| ModelError {
+        text: "".into(),
+        place: None,
+        message: format!("{name} cannot be told a start: {}", error.message),
+        ..error
     })
 }
 

@@ -45,6 +45,8 @@ pub(super) struct ModelFile {
     pub state: StateTable,
     /// What the agent believes at the start: one Gaussian, or a list of weighted ones.
     pub start: OneOrMany<StartTable>,
+    /// Which of several starts, counted from 1, the agent is told that an episode begins at: there is no other then. Default: it is not told.
+    pub told: Option<usize>,
     /// How actions move the state.
     pub motion: MotionTable,
     /// What the agent senses.

@@ -28,7 +28,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::model::{ActionId, ModeId, Model, StartHypothesis, WallBelief, applies};
 
-pub use builtin::{builtin, find, gallery_names, names};
+use builtin::TOLD;
+pub use builtin::{builtin, find, find_builtin, gallery_names, names};
 pub use file::schema;
 pub use read::{load, read};
 pub use robot::Robot;

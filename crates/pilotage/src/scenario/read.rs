@@ -55,6 +55,14 @@ pub fn read(text: &str, origin: &str) -> Result<Scenario, ModelError> {
 /// # Errors
 /// If the file cannot be opened, is not UTF-8 text, or is not a valid model; see [`read`].
 pub fn load(path: &Path) -> Result<Scenario, ModelError> {
+    read(&text_of(path)?, &path.display().to_string())
+}
+
+/// The text of a model file.
+///
+/// # Errors
+/// If the file cannot be opened, or is not UTF-8 text.
+pub(super) fn text_of(path: &Path) -> Result<String, ModelError> {
     let origin = path.display().to_string();
     let bytes = read_file(path, MOST_MEBIBYTES).map_err(|error| ModelError {
         origin: origin.as_str().into(),
@@ -63,7 +71,7 @@ pub fn load(path: &Path) -> Result<Scenario, ModelError> {
         message: format!("cannot read the file: {error}"),
         hint: "give the path of a model file, or the name of a built-in model".to_owned(),
     })?;
-    let text = String::from_utf8(bytes).map_err(|error| {
+    String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
         ModelError {
@@ -73,8 +81,7 @@ pub fn load(path: &Path) -> Result<Scenario, ModelError> {
             message: "the file is not UTF-8 text".to_owned(),
             hint: "a model file is TOML text; save it as UTF-8".to_owned(),
         }
-    })?;
-    read(&text, &origin)
+    })
 }
 
 /// The text without the tables of what is true and of rules of thumb, which no policy depends on.

@@ -90,7 +90,7 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
     let model = Model {
         laws: laws::laws(&file, &names, &writing)?,
         state,
-        start: names.start(&file.start, Path::new("start"))?,
+        start: told(&file, names.start(&file.start, Path::new("start"))?)?,
         later: later(&file, &motion, &sensor)?,
         sensor,
         actions: file
@@ -108,7 +108,10 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
         map,
         text: ModelText::default(),
         modes: names.modes,
-        name: file.name,
+        name: match file.told {
+            Some(start) => format!("{}{TOLD}{start}", file.name),
+            None => file.name,
+        },
         about: file.about,
         discount: file.discount,
     };
@@ -119,6 +122,33 @@ pub(super) fn resolve(file: ModelFile) -> Result<Scenario, Fault> {
         fault
     })?;
     Ok(scenario)
+}
+
+/// The starts that are left if the agent is told which it is.
+fn told(file: &ModelFile, starts: Vec<StartHypothesis>) -> Result<Vec<StartHypothesis>, Fault> {
+    let Some(number) = file.told else {
+        return Ok(starts);
+    };
+    let fault = |what: String, hint: &str| Fault::of_key(Path::new("told"), what, hint);
+    if file.world.start.is_some() {
+        let what = "`told` says where an episode begins, and `start` in [world] does as well";
+        return Err(fault(what.to_owned(), "delete one of them"));
+    }
+    let count = starts.len();
+    let chosen = number
+        .checked_sub(1)
+        .and_then(|i| starts.into_iter().nth(i));
+    let Some(start) = chosen else {
+        let what = format!("there is no start {number}: there are {count}, counted from 1");
+        return Err(fault(
+            what,
+            "give the number of one of the [[start]] tables",
+        ));
+    };
+    Ok(vec![StartHypothesis {
+        weight: 1.0,
+        ..start
+    }])
 }
 
 /// The names that a file declares and its other tables refer to.

@@ -284,6 +284,14 @@ impl Grid {
         .sum()
     }
 
+    /// The points before and after a point along an axis; `None` at its ends.
+    pub(crate) fn beside(&self, point: usize, axis: usize) -> Option<[usize; 2]> {
+        let (count, stride) = (self.axes[axis].count, self.strides[axis]);
+        let number = point / stride % count;
+        let inside = 0 < number && number + 1 < count;
+        inside.then(|| [point - stride, point + stride])
+    }
+
     /// The average of a function around every point: `W(x) = E V(x + e)`, `e ~ N(0, covariance)`.
     pub(crate) fn smoother(&self, covariance: &DMatrix<f64>) -> Smoother {
         let directions = square_root(covariance);

@@ -21,6 +21,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::grid::{Axis, Grid, Interpolation};
 use super::refusals;
 use super::settings::{Settings, ensure};
 use super::solver::{Found, Plan, Planner, Problem, refuse_if};
@@ -33,7 +34,7 @@ use crate::progress::Progress;
 use crate::scenario::Scenario;
 use crate::simulate::{Options, evaluate};
 pub use grid_values::GridValues;
-use meet::meet;
+use meet::{Met, meet};
 use rows::Rows;
 
 /// Name of the solver in errors and policies.
@@ -46,7 +47,8 @@ pub struct CodebookPlanner {
     pub strata: Option<usize>,
     /// How far apart strata are at least, in units of the logarithm of a standard deviation; more than 0.
     pub apart: f64,
-    /// Points of the grid of means along each variable; at least 2, or `auto` for what suits the number of variables.
+    /// Points of the grid of means along each variable; at least 2, or `auto` for what suits the number of variables, and up to twice as many in
+    /// each further round where values bend between them.
     pub points: Option<usize>,
     /// Readings that are thought of after an action; at least 1.
     pub readings: usize,
@@ -164,6 +166,122 @@ struct Round {
     earned: f64,
 }
 
+/// Planning in rounds, and what goes from one to the next.
+struct Course<'a, K: Keeping> {
+    planner: &'a CodebookPlanner,
+    model: &'a Model,
+    keeping: Arc<K>,
+    updater: fn(Coded<K>) -> Updater,
+    seed: u64,
+    size: Size,
+    codebook: Codebook,
+    /// The belief that each stratum was met as.
+    shapes: Vec<K::Full>,
+    met: Vec<Met<K::Full>>,
+    /// Points of the grid along each variable.
+    points: Vec<usize>,
+    /// Rows of the last round, where they are still on the right grid.
+    earlier: Option<Rows>,
+}
+
+impl<'a, K: Keeping> Course<'a, K> {
+    fn new(
+        planner: &'a CodebookPlanner,
+        model: &'a Model,
+        (keeping, updater): (Arc<K>, fn(Coded<K>) -> Updater),
+        seed: u64,
+    ) -> Self {
+        Self {
+            planner,
+            model,
+            updater,
+            seed,
+            size: planner.size(keeping.is_light()),
+            codebook: Codebook::new(model),
+            shapes: Vec::new(),
+            met: meet(model, keeping.as_ref(), None, planner.episodes, seed),
+            points: planner.first_points(model),
+            earlier: None,
+            keeping,
+        }
+    }
+
+    fn round(&mut self, round: usize) -> Round {
+        let (planner, model) = (self.planner, self.model);
+        let rows = self.rows(round);
+        let found = rows.solve(model.discount, planner.tolerance);
+        let keeping = self.keeping.as_ref();
+        let planned = rows.worth(keeping, &self.codebook, &found, model.discount, planner);
+        let codebook = Arc::new(self.codebook.clone());
+        let actions = model.actions.len();
+        let values = GridValues::new(rows.grid.clone(), Arc::clone(&codebook), &found, actions);
+        let coded = Coded::new(model, Arc::clone(&self.keeping), Arc::clone(&codebook));
+        let updater = (self.updater)(coded);
+        let earned = self.earned(&values, &updater);
+        let seed = self.seed.wrapping_add(2 + round as u64);
+        self.met = meet(model, keeping, Some(&values), planner.episodes, seed);
+        self.refine_grid(rows, &found, planned);
+        Round {
+            values,
+            updater,
+            codebook,
+            planned,
+            earned,
+        }
+    }
+
+    /// The rows of a codebook to which strata of what was met are added.
+    fn rows(&mut self, round: usize) -> Rows {
+        let moments: Vec<Moments> = self.met.iter().map(|met| met.moments.clone()).collect();
+        let (apart, most) = (self.planner.apart, self.size.strata_of(round));
+        let added = self.codebook.cover(&moments, apart, most).into_iter();
+        self.shapes.extend(added.map(|i| self.met[i].full.clone()));
+        let reaches = |rows: &Rows| moments.iter().all(|met| rows.grid.contains(&met.mean));
+        let earlier = self.earlier.take().filter(reaches);
+        let known = earlier.as_ref().map(|rows| rows.grid.clone());
+        let grid = known.unwrap_or_else(|| grid(self.model, &moments, &self.points));
+        let coarse = self.keeping.coarse();
+        let keeping = self.keeping.as_ref();
+        Rows::new(
+            (keeping, coarse.as_ref().unwrap_or(keeping)),
+            (&self.codebook, self.shapes.as_slice()),
+            grid,
+            &self.met,
+            (self.size.refined, self.planner.readings),
+            earlier,
+        )
+    }
+
+    /// What the plan itself earns where the model holds.
+    fn earned(&self, values: &GridValues, updater: &Updater) -> f64 {
+        let options = Options {
+            episodes: TRIALS * self.planner.episodes,
+            seed: self.seed.wrapping_add(1),
+        };
+        let assumed = Scenario::assumed(self.model);
+        let silent = &crate::progress::Silent;
+        let evaluation = evaluate(&assumed, updater, values, options, silent);
+        evaluation.discounted.mean
+    }
+
+    /// Chooses the points of the next round, where nobody has said how many there are, and keeps the rows if they stay.
+    fn refine_grid(&mut self, rows: Rows, found: &[f64], planned: f64) {
+        let points = match self.planner.points {
+            Some(_) => self.points.clone(),
+            None => {
+                let steps = (self.met.len() / self.planner.episodes).max(1) as i32;
+                let horizon: f64 = (0..steps).map(|t| self.model.discount.powi(t)).sum();
+                let bends = rows.bends(&self.codebook, found, &self.met).into_iter();
+                let off = bends.map(|bend| horizon * bend / (OFF * planned.abs()));
+                let shares = self.size.strata * self.model.actions.len();
+                finer(&self.points, off, MOST_ROWS / shares.max(1))
+            }
+        };
+        self.earlier = (points == self.points).then_some(rows);
+        self.points = points;
+    }
+}
+
 impl CodebookPlanner {
     fn plan_with<K: Keeping>(
         &self,
@@ -173,74 +291,21 @@ impl CodebookPlanner {
         seed: u64,
         observer: &dyn Progress,
     ) -> Result<Plan> {
-        let size = self.size(keeping.is_light());
-        let coarse = keeping.coarse();
-        let mut codebook = Codebook::new(model);
-        let mut met = meet(model, keeping.as_ref(), None, self.episodes, seed);
+        let mut course = Course::new(self, model, (keeping, updater), seed);
+        let rounds = course.size.rounds;
         let mut best: Option<Round> = None;
-        let mut shapes: Vec<K::Full> = Vec::new();
-        let mut earlier: Option<Rows> = None;
-        for round in 0..size.rounds {
-            observer.progress("rounds", round as u64, size.rounds as u64);
-            let moments: Vec<Moments> = met.iter().map(|met| met.moments.clone()).collect();
-            let added = codebook.cover(&moments, self.apart, size.strata_of(round));
-            shapes.extend(added.into_iter().map(|i| met[i].full.clone()));
-            let reaches = |rows: &Rows| moments.iter().all(|met| rows.grid.contains(&met.mean));
-            earlier = earlier.filter(reaches);
-            let known = earlier.as_ref().map(|rows| rows.grid.clone());
-            let grid = known.unwrap_or_else(|| self.grid(model, &moments));
-            let ways = (keeping.as_ref(), coarse.as_ref().unwrap_or(&keeping));
-            let strata = (&codebook, shapes.as_slice());
-            let rows = Rows::new(
-                ways,
-                strata,
-                grid,
-                &met,
-                (size.refined, self.readings),
-                earlier.take(),
-            );
-            let found = rows.solve(model.discount, self.tolerance);
-            let planned = rows.worth(keeping.as_ref(), &codebook, &found, model.discount, self);
-            let grid = rows.grid.clone();
-            earlier = Some(rows);
-            let shared = Arc::new(codebook.clone());
-            let values = GridValues::new(grid, Arc::clone(&shared), &found, model.actions.len());
-            let updater = updater(Coded::new(model, Arc::clone(&keeping), Arc::clone(&shared)));
-            let options = Options {
-                episodes: TRIALS * self.episodes,
-                seed: seed.wrapping_add(1),
-            };
-            let assumed = Scenario::assumed(model);
-            let earned = evaluate(
-                &assumed,
-                &updater,
-                &values,
-                options,
-                &crate::progress::Silent,
-            );
-            let earned = earned.discounted.mean;
-            met = meet(
-                model,
-                keeping.as_ref(),
-                Some(&values),
-                self.episodes,
-                seed.wrapping_add(2 + round as u64),
-            );
-            if best.as_ref().is_none_or(|best| earned > best.earned) {
-                best = Some(Round {
-                    values,
-                    updater,
-                    codebook: shared,
-                    planned,
-                    earned,
-                });
+        for round in 0..rounds {
+            observer.progress("rounds", round as u64, rounds as u64);
+            let found = course.round(round);
+            if best.as_ref().is_none_or(|best| found.earned > best.earned) {
+                best = Some(found);
             }
         }
-        observer.progress("rounds", size.rounds as u64, size.rounds as u64);
+        observer.progress("rounds", rounds as u64, rounds as u64);
         let Some(best) = best else {
             return Err(crate::Error::Setting {
                 setting: "rounds",
-                value: size.rounds.to_string(),
+                value: rounds.to_string(),
                 range: "at least 1",
             });
         };
@@ -264,8 +329,8 @@ impl CodebookPlanner {
         }
     }
 
-    /// Points of means that cover those that were met.
-    fn grid(&self, model: &Model, met: &[Moments]) -> super::grid::Grid {
+    /// Points along each variable in the first round.
+    fn first_points(&self, model: &Model) -> Vec<usize> {
         let n = model.state_dim();
         let points = self.points.unwrap_or(match n {
             1 => 201,
@@ -273,25 +338,55 @@ impl CodebookPlanner {
             3 => 15,
             _ => 9,
         });
-        let axis = |i: usize| {
-            let means = met.iter().map(|moments| moments.mean[i]);
-            let (low, high) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-                (low.min(x), high.max(x))
-            });
-            let margin = 0.05 * (high - low).max(1e-9);
-            let bounds = model.state[i].bounds;
-            let (low, high) = (
-                (low - margin).max(bounds.low),
-                (high + margin).min(bounds.high),
-            );
-            super::grid::Axis::new(low, high.max(low + 1e-9), points)
-        };
-        super::grid::Grid::new(
-            (0..n).map(axis).collect(),
-            super::grid::Interpolation::Linear,
-        )
+        vec![points; n]
     }
 }
+
+/// Points of means that cover those that were met.
+fn grid(model: &Model, met: &[Moments], points: &[usize]) -> Grid {
+    let axis = |i: usize| {
+        let means = met.iter().map(|moments| moments.mean[i]);
+        let (low, high) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        let margin = 0.05 * (high - low).max(1e-9);
+        let bounds = model.state[i].bounds;
+        let (low, high) = (
+            (low - margin).max(bounds.low),
+            (high + margin).min(bounds.high),
+        );
+        Axis::new(low, high.max(low + 1e-9), points[i])
+    };
+    Grid::new((0..points.len()).map(axis).collect(), Interpolation::Linear)
+}
+
+/// As many points as leave straight lines between them off by as much as may be, where they are `off` by so many times that; at most twice
+/// as many along a variable, and `most` in all. What is off falls with the square of the distance of points.
+fn finer(points: &[usize], off: impl Iterator<Item = f64>, most: usize) -> Vec<usize> {
+    let factors: Vec<f64> = off.map(|off| off.sqrt().clamp(1.0, 2.0)).collect();
+    let scaled = |share: f64| -> Vec<usize> {
+        let of = |(points, factor): (&usize, &f64)| {
+            let intervals = (points - 1) as f64 * (1.0 + share * (factor - 1.0));
+            intervals.ceil() as usize + 1
+        };
+        points.iter().zip(&factors).map(of).collect()
+    };
+    let shares = (1..=SHARES).rev().map(|k| k as f64 / SHARES as f64);
+    let fits = |points: &Vec<usize>| points.iter().product::<usize>() <= most;
+    shares
+        .map(scaled)
+        .find(fits)
+        .unwrap_or_else(|| points.to_vec())
+}
+
+/// Share of the plan by which straight lines between points may be off along a variable, all steps of an episode together.
+const OFF: f64 = 0.01;
+
+/// Most rows that a grid is made finer for: about a kilobyte each.
+const MOST_ROWS: usize = 600_000;
+
+/// Steps in which a finer grid is given up where it has too many points.
+const SHARES: usize = 8;
 
 /// Rounds are compared by so many times as many episodes as beliefs are met in.
 const TRIALS: usize = 5;

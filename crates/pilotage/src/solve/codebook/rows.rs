@@ -13,7 +13,8 @@ use crate::solve::grid::Grid;
 struct Row {
     reward: f64,
     restarted: f64,
-    next: Vec<(u32, f64)>,
+    /// Single precision is far finer than the readings are spread, and there are many.
+    next: Vec<(u32, f32)>,
 }
 
 /// All rows, by state and action.
@@ -22,7 +23,7 @@ pub(super) struct Rows {
     rows: Vec<Row>,
     actions: usize,
     /// Where an episode starts: states with weights.
-    start: Vec<(u32, f64)>,
+    start: Vec<(u32, f32)>,
     /// States whose rows are of beliefs that were met.
     refined: BTreeSet<usize>,
 }
@@ -78,7 +79,7 @@ impl Reader<'_> {
 }
 
 /// Entries of one state added up, those that do not count left out.
-fn merged(mut entries: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
+fn merged(mut entries: Vec<(u32, f64)>) -> Vec<(u32, f32)> {
     const NOTHING: f64 = 1e-9;
     entries.sort_by_key(|(state, _)| *state);
     entries.dedup_by(|(state, weight), (kept, sum)| {
@@ -88,9 +89,9 @@ fn merged(mut entries: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
         }
         same
     });
-    entries.retain(|(_, weight)| *weight > NOTHING);
-    entries.shrink_to_fit();
-    entries
+    let kept = entries.iter().filter(|(_, weight)| *weight > NOTHING);
+    kept.map(|&(state, weight)| (state, weight as f32))
+        .collect()
 }
 
 /// The average of rows.
@@ -101,7 +102,7 @@ fn averaged(rows: &[Row]) -> Row {
         reward: share * rows.iter().map(|row| row.reward).sum::<f64>(),
         restarted: share * rows.iter().map(|row| row.restarted).sum::<f64>(),
         next: merged(
-            next.map(|&(state, weight)| (state, share * weight))
+            next.map(|&(state, weight)| (state, share * f64::from(weight)))
                 .collect(),
         ),
     }
@@ -210,10 +211,10 @@ impl Rows {
     }
 
     fn worth_of(&self, row: &Row, values: &[f64], discount: f64) -> f64 {
-        let sum = |entries: &[(u32, f64)]| -> f64 {
+        let sum = |entries: &[(u32, f32)]| -> f64 {
             let entries = entries.iter();
             entries
-                .map(|(state, weight)| weight * values[*state as usize])
+                .map(|(state, weight)| f64::from(*weight) * values[*state as usize])
                 .sum()
         };
         let afresh = match row.restarted > 0.0 {
@@ -221,6 +222,32 @@ impl Rows {
             false => 0.0,
         };
         row.reward + discount * (sum(&row.next) + afresh)
+    }
+
+    /// The value of every state.
+    fn best(&self, found: &[f64]) -> Vec<f64> {
+        let best = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        found.chunks(self.actions).map(best).collect()
+    }
+
+    /// By how much straight lines between points are off along each variable, on average over beliefs that were met. Where every second
+    /// point is left out a point itself says it; lines half as long are off by a quarter of that.
+    pub(super) fn bends<F>(&self, codebook: &Codebook, found: &[f64], met: &[Met<F>]) -> Vec<f64> {
+        let values = self.best(found);
+        let mut bends = vec![0.0; self.grid.axes().len()];
+        let mut code = Vec::new();
+        for met in met {
+            let stratum = codebook.nearest(&met.moments, &mut code);
+            let point = self.grid.nearest(&met.moments.mean);
+            let at = |point: usize| values[stratum * self.grid.len() + point];
+            for (axis, bend) in bends.iter_mut().enumerate() {
+                if let Some([before, after]) = self.grid.beside(point, axis) {
+                    *bend += 0.25 * (at(point) - 0.5 * (at(before) + at(after))).abs();
+                }
+            }
+        }
+        let count = met.len().max(1) as f64;
+        bends.into_iter().map(|bend| bend / count).collect()
     }
 
     /// What the best action is worth at the start itself.
@@ -236,8 +263,7 @@ impl Rows {
             codebook,
             grid: &self.grid,
         };
-        let best = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let values: Vec<f64> = found.chunks(self.actions).map(best).collect();
+        let values = self.best(found);
         let start = keeping.start();
         let of = |action| {
             let row = reader.row(keeping, &start, action, FINE * settings.readings);
