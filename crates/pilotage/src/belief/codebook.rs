@@ -4,13 +4,16 @@ use super::StratumId;
 use super::full::Moments;
 use crate::model::{ModeId, Model};
 
-/// Strata that two beliefs lie between are told by their covariance and by how likely modes are. Distances are measured between logarithms
-/// of standard deviations, correlations, and square roots of probabilities.
+/// Strata that two beliefs lie between are told by their covariance and by how likely modes are and, where a model changes with the step of
+/// the episode, by the step. Distances are measured between logarithms of standard deviations, correlations, and square roots of
+/// probabilities.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Codebook {
     strata: Vec<Stratum>,
     /// Standard deviations below which beliefs count as certain, length `n`.
     floors: Vec<f64>,
+    /// Steps that are told apart.
+    clock: usize,
 }
 
 /// Everything about a belief but its mean.
@@ -20,12 +23,17 @@ pub struct Stratum {
     pub covariance: Vec<f64>,
     /// Probability of each mode; they sum to 1.
     pub weights: Vec<f64>,
+    /// Step of the episode; 0 where steps are not told apart.
+    pub step: usize,
     /// Where it is among strata.
     code: Vec<f64>,
 }
 
 /// How far apart beliefs of certain and of even modes are, in the units of logarithms of standard deviations.
 const MODES: f64 = 2.0;
+
+/// How far apart beliefs at one step and at the next are, in the same units, where steps are told apart.
+const STEP: f64 = 0.5;
 
 /// A belief that is so many times narrower than the start, or than the bounds, is certain.
 const CERTAIN: f64 = 1e-3;
@@ -63,23 +71,36 @@ impl Codebook {
         Self {
             strata: Vec::new(),
             floors: (0..model.state_dim()).map(floor).collect(),
+            clock: model.clock(),
         }
     }
 
-    /// The codebook of given strata, in this order.
-    pub fn of(floors: Vec<f64>, strata: impl IntoIterator<Item = (Vec<f64>, Vec<f64>)>) -> Self {
+    /// The codebook of strata of given covariances, probabilities of modes and steps, in this order, that tells apart the steps up to
+    /// `clock` ([`Model::clock`]).
+    pub fn of(
+        floors: Vec<f64>,
+        clock: usize,
+        strata: impl IntoIterator<Item = (Vec<f64>, Vec<f64>, usize)>,
+    ) -> Self {
         let mut codebook = Self {
             strata: Vec::new(),
             floors,
+            clock,
         };
-        for (covariance, weights) in strata {
+        for (covariance, weights, step) in strata {
             codebook.add(&Moments {
                 mean: Vec::new(),
                 covariance,
                 weights,
+                step,
             });
         }
         codebook
+    }
+
+    /// Steps up to which strata are told apart by the step; 0 where they are not.
+    pub fn clock(&self) -> usize {
+        self.clock
     }
 
     /// Number of strata.
@@ -109,6 +130,7 @@ impl Codebook {
         self.strata.push(Stratum {
             covariance: moments.covariance.clone(),
             weights: moments.weights.clone(),
+            step: moments.step.min(self.clock),
             code,
         });
     }
@@ -207,6 +229,9 @@ impl Codebook {
                     .iter()
                     .map(|weight| MODES * weight.max(0.0).sqrt()),
             );
+        }
+        if self.clock > 0 {
+            code.push(STEP * moments.step.min(self.clock) as f64);
         }
     }
 }

@@ -13,6 +13,8 @@ pub struct Moments {
     pub covariance: Vec<f64>,
     /// Probability of each mode; they sum to 1.
     pub weights: Vec<f64>,
+    /// Step of the episode at which it is held, from 0. Who writes the other moments does not know it, and leaves it.
+    pub step: usize,
 }
 
 /// What an action is expected to pay and to do to an episode.

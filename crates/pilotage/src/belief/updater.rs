@@ -135,6 +135,7 @@ impl<K: Keeping> Coded<K> {
 
     fn read(&self, running: &mut Running<K::Full>, read: &mut Belief) {
         self.keeping.moments(&running.full, &mut running.moments);
+        running.moments.step = running.step;
         read.stratum = self.codebook.nearest(&running.moments, &mut running.code);
         read.mode = self.codebook.stratum(read.stratum).mode();
         read.mean.clone_from(&running.moments.mean);

@@ -196,8 +196,27 @@ impl Model {
     /// The first step of an episode from which on nothing in the model changes any more with the step; 0 where nothing ever does. What
     /// would change after the last step of an episode does not count.
     pub fn clock(&self) -> usize {
+        if self.formulas_tell_steps() {
+            return self.episode.length;
+        }
         let last = self.turns().into_iter().max().unwrap_or(0);
         last.min(self.episode.length)
+    }
+
+    fn formulas_tell_steps(&self) -> bool {
+        let starts = self.start.iter().map(|start| start.mean.as_slice());
+        let places: Vec<Point<'_>> = starts
+            .flat_map(|state| {
+                self.actions.iter().map(move |action| Point {
+                    state,
+                    control: action.control.as_slice(),
+                    step: 0,
+                })
+            })
+            .collect();
+        let paid = self.rewards.iter().filter_map(|term| term.formula.as_ref());
+        let mut formulas = paid.chain(self.laws.formulas());
+        formulas.any(|formula| formula.tells_steps(&places, self.episode.length))
     }
 
     /// The steps from which on something is different from before, in rising order, 0 among them.

@@ -56,7 +56,8 @@ pub struct Coded {
 }
 
 impl Formula {
-    /// A function under a name: two formulas of one name are taken for the same.
+    /// A function under a name: two formulas of one name are taken for the same. Whether it depends on the step is found by asking it at the
+    /// starts of a model.
     pub fn coded(name: &str, function: impl Fn(&Point<'_>) -> f64 + Send + Sync + 'static) -> Self {
         Self::Coded(Coded {
             name: name.to_owned(),
@@ -86,6 +87,20 @@ impl Formula {
             Self::Written(expression) => expression.constant(),
             Self::Coded(_) => None,
         }
+    }
+
+    /// Whether it says something else from step to step at these places: whether an expression names the step, or the values of a function
+    /// differ up to so many steps.
+    pub(crate) fn tells_steps(&self, places: &[Point<'_>], steps: usize) -> bool {
+        places.iter().any(|place| match self {
+            Self::Number(_) => false,
+            Self::Written(expression) => expression.uses(place.state.len() + place.control.len()),
+            Self::Coded(_) => {
+                let at = |step| self.value(&Point { step, ..*place });
+                let first = at(0);
+                (1..=steps).any(|step| at(step) != first)
+            }
+        })
     }
 
     /// What it says, for people: the number, the expression, or the name of the function.
@@ -177,6 +192,20 @@ pub enum VariableKind {
     Integer,
     /// An angle in radians, kept in `[-pi, pi)`.
     Angle,
+}
+
+impl Laws {
+    /// All formulas in it.
+    pub(crate) fn formulas(&self) -> impl Iterator<Item = &Formula> {
+        self.cases.iter().flat_map(|case| {
+            let (motion, sensor) = (&case.motion, &case.sensor);
+            let noises = [&motion.noise, &sensor.noise];
+            let noises = noises.into_iter().flatten().flat_map(|noise| noise.iter());
+            let steps = motion.step.iter().flatten();
+            let heard = sensor.read.iter().chain(&sensor.symbols);
+            steps.chain(heard).chain(&sensor.present).chain(noises)
+        })
+    }
 }
 
 impl Case {

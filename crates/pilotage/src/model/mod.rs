@@ -457,7 +457,7 @@ impl Model {
     fn counts_only(&self) -> bool {
         let mut state = self.state.iter();
         let counts = state.all(|variable| variable.kind == VariableKind::Integer);
-        counts && self.clock() == 0 && self.state_dim() <= 2
+        counts && self.state_dim() <= 2
     }
 
     /// Whether motion and sensing are linear, with Gaussian noise that no place and no mode changes, events are certain where they
@@ -518,12 +518,14 @@ impl Model {
     }
 
     /// What keeps its belief: what [`BeliefSettings::tracker`] says or, by itself, the Kalman filter for a linear model, cells for a discrete
-    /// sensor, and a sum of Gaussians elsewhere. What the filter loses of a linear model, [`Model::beyond_levels`] says.
+    /// sensor unless something changes with the step, and a sum of Gaussians elsewhere. What the filter loses of a linear model, [`Model::beyond_levels`] says.
     pub fn tracker(&self) -> TrackerKind {
         match self.belief.tracker {
             TrackerKind::Auto if self.is_linear() => TrackerKind::Linear,
-            TrackerKind::Auto if !self.laws.symbols.is_empty() => TrackerKind::Cells,
-            TrackerKind::Auto if self.counts_only() => TrackerKind::Cells,
+            TrackerKind::Auto if self.clock() > 0 => TrackerKind::Sum,
+            TrackerKind::Auto if !self.laws.symbols.is_empty() || self.counts_only() => {
+                TrackerKind::Cells
+            }
             TrackerKind::Auto => TrackerKind::Sum,
             chosen => chosen,
         }

@@ -267,6 +267,7 @@ impl BeliefTable {
             |StratumTable {
                  covariance: matrix_,
                  modes,
+                 step: _,
              }| {
                 matrix(matrix_, sizes.states, sizes.states).at("covariance")?;
                 covariance(matrix_, largest).at("covariance")?;
@@ -380,6 +381,7 @@ fn check_tree(tests: &[Test], sizes: &Sizes) -> Checked {
                 index(variable, sizes.states, "state variables").at("feature")?;
             }
             Feature::Mode(mode) => sizes.mode(&mode).at("feature")?,
+            Feature::Step => {}
         }
         number(test.less_than).at("less_than")?;
         for (key, branch) in [("yes", test.yes), ("no", test.no)] {

@@ -152,6 +152,7 @@ fn belief_table(automaton: &Automaton) -> Checked<Option<BeliefTable>> {
         StratumTable {
             covariance: rows(&stratum.covariance, n),
             modes: stratum.weights.clone(),
+            step: stratum.step,
         }
     });
     let table = BeliefTable {
@@ -181,8 +182,9 @@ impl BeliefTable {
     fn updater(self, fingerprint: Fingerprint) -> Checked<Updater> {
         let model = self.model(fingerprint).at("model")?;
         let strata = self.strata.into_iter();
-        let strata = strata.map(|stratum| (stratum.covariance.concat(), stratum.modes));
-        let codebook = Arc::new(Codebook::of(self.certain, strata));
+        let strata =
+            strata.map(|stratum| (stratum.covariance.concat(), stratum.modes, stratum.step));
+        let codebook = Arc::new(Codebook::of(self.certain, model.clock(), strata));
         Updater::coded(&model, self.tracker, codebook)
             .map_err(|error| Fault::new(error.to_string()))
     }

@@ -101,8 +101,8 @@ pub(super) struct BeliefTable {
     pub model: String,
     /// Standard deviations below which a belief counts as certain, n numbers above 0.
     pub certain: Vec<f64>,
-    /// The strata, at least one. A belief is read as the nearest, by the logarithms of standard deviations, the correlations, and twice the
-    /// square roots of the probabilities of modes.
+    /// The strata, at least one. A belief is read as the nearest, by the logarithms of standard deviations, the correlations, twice the
+    /// square roots of the probabilities of modes and, where the model changes with the step of the episode, half the step.
     #[schemars(length(min = 1))]
     pub strata: Vec<StratumTable>,
 }
@@ -115,6 +115,9 @@ pub(super) struct StratumTable {
     pub covariance: Vec<Vec<f64>>,
     /// Probability of each mode; they sum to 1.
     pub modes: Vec<f64>,
+    /// Step of the episode, where the model changes with it. Default: 0.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub step: usize,
 }
 
 /// A belief: how uncertain, in which mode, where.

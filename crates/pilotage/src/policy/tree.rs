@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Automaton, NodeId};
-use crate::belief::{Belief, Held, Moments, StratumId};
+use crate::belief::{Belief, Filter, Held, Moments, StratumId};
 use crate::model::ModeId;
 
 /// Something about a belief that a tree asks for.
@@ -17,6 +17,8 @@ pub enum Feature {
     Deviation(usize),
     /// Probability of a mode; 1 or 0 where one mode is believed.
     Mode(ModeId),
+    /// Step of the episode, from 0.
+    Step,
 }
 
 /// Where a tree goes on.
@@ -66,6 +68,7 @@ impl Asked for Moments {
                 variance.max(0.0).sqrt()
             }
             Feature::Mode(mode) => self.weights[mode],
+            Feature::Step => self.step as f64,
         }
     }
 }
@@ -77,6 +80,8 @@ pub(crate) struct StratumFeatures {
     pub deviations: Vec<f64>,
     /// Probability of each mode; `None` where one is believed.
     pub weights: Option<Vec<f64>>,
+    /// Step of the episode, as far as steps are told apart.
+    pub step: usize,
 }
 
 /// A belief as it is read: its stratum answers for all but its mean.
@@ -90,6 +95,7 @@ impl Asked for (&StratumFeatures, &Belief) {
                 Some(weights) => weights[mode],
                 None => f64::from(belief.mode == mode),
             },
+            Feature::Step => stratum.step as f64,
         }
     }
 }
@@ -101,7 +107,12 @@ impl StratumFeatures {
         let covariance = &automaton.levels[stratum];
         let deviation = |i: usize| covariance[i * n + i].max(0.0).sqrt();
         let codebook = automaton.updater.codebook();
+        let time = |filter: &Filter| filter.times.get(stratum).copied();
         Self {
+            step: match codebook {
+                Some(codebook) => codebook.stratum(stratum).step,
+                None => automaton.updater.filter().and_then(time).unwrap_or(0),
+            },
             deviations: (0..n).map(deviation).collect(),
             weights: codebook.map(|codebook| codebook.stratum(stratum).weights.clone()),
         }
@@ -178,6 +189,7 @@ impl Automaton {
             Feature::Mean(variable) => self.states[variable].clone(),
             Feature::Deviation(variable) => format!("sd_{}", self.states[variable]),
             Feature::Mode(mode) => format!("p_{}", self.modes[mode]),
+            Feature::Step => "t".to_owned(),
         }
     }
 }

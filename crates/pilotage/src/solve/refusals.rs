@@ -34,8 +34,12 @@ pub(super) fn pays_afterwards(model: &Model) -> Option<String> {
 /// Values of true states do not tell the step.
 pub(super) fn changes(model: &Model) -> Option<String> {
     let clock = model.clock();
+    let other = match model.is_linear() {
+        true => "value-iteration",
+        false => "codebook",
+    };
     (clock > 0).then(|| {
-        format!("what it pays or changes, or how it moves or is sensed, depends on the step of the episode up to step {clock}, and this solver's values do not; use value-iteration")
+        format!("what it pays or changes, or how it moves or is sensed, depends on the step of the episode up to step {clock}, and this solver's values do not; use {other}")
     })
 }
 

@@ -43,8 +43,12 @@ pub(super) fn meet<K: Keeping>(
         let mut action = any(model, &mut whims);
         let mut full = keeping.start();
         world.reset(&mut draws);
-        for step in 0..model.episode.length.min(MOST) {
-            let mut moments = Moments::default();
+        let mut step = 0;
+        for _ in 0..model.episode.length.min(MOST) {
+            let mut moments = Moments {
+                step,
+                ..Moments::default()
+            };
             keeping.moments(&full, &mut moments);
             action = match policy {
                 Some(policy) if uniform(&mut whims) >= SLIPS => {
@@ -60,10 +64,11 @@ pub(super) fn meet<K: Keeping>(
             let taken = world.step(action, &mut draws, &mut observation);
             match taken.then {
                 Then::End => break,
-                Then::Restart => full = keeping.start(),
+                Then::Restart => (full, step) = (keeping.start(), 0),
                 Then::Continue => {
                     keeping.act(&mut full, action, step);
                     keeping.sense(&mut full, action, step, observation.reading());
+                    step += 1;
                 }
             }
         }

@@ -104,9 +104,7 @@ pub fn accepts(model: &Model) -> Result<()> {
             "its belief is one Gaussian on uncertainty levels; use value-iteration, or write `tracker = \"sum\"` in [belief]".to_owned()
         })
     };
-    let reason = refusals::reward_missing(model)
-        .or_else(exact)
-        .or_else(|| refusals::changes(model));
+    let reason = refusals::reward_missing(model).or_else(exact);
     refuse_if(SOLVER, model, reason)
 }
 
@@ -245,7 +243,7 @@ impl<'a, K: Keeping> Course<'a, K> {
         Rows::new(
             (keeping, coarse.as_ref().unwrap_or(keeping)),
             (&self.codebook, self.shapes.as_slice()),
-            grid,
+            (grid, self.model.episode.length),
             &self.met,
             (self.size.refined, self.planner.readings),
             earlier,

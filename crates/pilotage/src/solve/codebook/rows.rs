@@ -20,6 +20,8 @@ struct Row {
 /// All rows, by state and action.
 pub(super) struct Rows {
     pub grid: Grid,
+    /// Steps of an episode.
+    length: usize,
     rows: Vec<Row>,
     actions: usize,
     /// Where an episode starts: states with weights.
@@ -38,6 +40,8 @@ const SWEEPS: usize = 5000;
 struct Reader<'a> {
     codebook: &'a Codebook,
     grid: &'a Grid,
+    /// Steps of an episode.
+    length: usize,
 }
 
 impl Reader<'_> {
@@ -52,20 +56,32 @@ impl Reader<'_> {
         }
     }
 
-    /// What an action leads to.
-    fn row<K: Keeping>(&self, keeping: &K, full: &K::Full, action: usize, readings: usize) -> Row {
+    /// What an action leads to at a step.
+    fn row<K: Keeping>(
+        &self,
+        keeping: &K,
+        (full, step): (&K::Full, usize),
+        action: usize,
+        readings: usize,
+    ) -> Row {
         let mut moved = full.clone();
-        let acted = keeping.act(&mut moved, action, 0);
+        let acted = keeping.act(&mut moved, action, step);
         let goes_on = 1.0 - acted.ended - acted.restarted;
         let mut next = Vec::new();
-        if goes_on > 1e-12 {
-            let (mut moments, mut code) = (Moments::default(), Vec::new());
-            for (likely, sensed) in keeping.readings(&moved, action, 0, readings) {
+        // Who tells steps apart knows the last one.
+        let last = self.codebook.clock() > 0 && step + 1 >= self.length;
+        if goes_on > 1e-12 && !last {
+            let mut moments = Moments {
+                step: step + 1,
+                ..Moments::default()
+            };
+            let mut code = Vec::new();
+            for (likely, sensed) in keeping.readings(&moved, action, step, readings) {
                 if likely <= 0.0 {
                     continue;
                 }
                 let mut after = moved.clone();
-                keeping.sense(&mut after, action, 0, sensed.reading());
+                keeping.sense(&mut after, action, step, sensed.reading());
                 keeping.moments(&after, &mut moments);
                 self.states(&moments, &mut code, &mut next, goes_on * likely);
             }
@@ -109,12 +125,12 @@ fn averaged(rows: &[Row]) -> Row {
 }
 
 impl Rows {
-    /// The rows of a codebook, whose strata have the shapes of beliefs in full, refined on beliefs that were met. Earlier rows on the same
+    /// The rows of a codebook, whose strata have the shapes of beliefs in full, refined on beliefs that were met, for episodes of so many steps. Earlier rows on the same
     /// grid are taken over where nothing was or is refined: strata stay what they are when others join them.
     pub(super) fn new<K: Keeping>(
         (keeping, coarse): (&K, &K),
         (codebook, shapes): (&Codebook, &[K::Full]),
-        grid: Grid,
+        (grid, length): (Grid, usize),
         met: &[Met<K::Full>],
         (most, readings): (usize, usize),
         earlier: Option<Self>,
@@ -122,6 +138,7 @@ impl Rows {
         let reader = Reader {
             codebook,
             grid: &grid,
+            length,
         };
         let actions = keeping.actions();
         let (points, states) = (grid.len(), codebook.len() * grid.len());
@@ -135,6 +152,7 @@ impl Rows {
                 return None;
             }
             let mean = grid.point(state % points);
+            let step = codebook.stratum(state / points).step;
             let (keeping, fulls) = match refined.get(&state) {
                 Some(fulls) => {
                     let moved = |&i: &usize| keeping.moved_to(&met[i].full, &mean);
@@ -146,7 +164,7 @@ impl Rows {
                 }
             };
             let of_action = |action: usize| {
-                let of = |full: &K::Full| reader.row(keeping, full, action, readings);
+                let of = |full: &K::Full| reader.row(keeping, (full, step), action, readings);
                 match fulls.as_slice() {
                     [full] => of(full),
                     fulls => averaged(&fulls.iter().map(of).collect::<Vec<_>>()),
@@ -179,6 +197,7 @@ impl Rows {
             start: merged(start),
             refined: refined.into_keys().collect(),
             grid,
+            length,
         }
     }
 
@@ -262,11 +281,12 @@ impl Rows {
         let reader = Reader {
             codebook,
             grid: &self.grid,
+            length: self.length,
         };
         let values = self.best(found);
         let start = keeping.start();
         let of = |action| {
-            let row = reader.row(keeping, &start, action, FINE * settings.readings);
+            let row = reader.row(keeping, (&start, 0), action, FINE * settings.readings);
             self.worth_of(&row, &values, discount)
         };
         (0..self.actions).map(of).fold(f64::NEG_INFINITY, f64::max)

@@ -91,6 +91,7 @@ impl Read {
             mean: belief.mean.clone(),
             covariance: stratum.covariance.clone(),
             weights: stratum.weights.clone(),
+            step: 0,
         })
     }
 }

@@ -112,7 +112,7 @@ impl Collected {
     }
 }
 
-/// What the tree may ask: means, deviations where they differ, modes where there are several.
+/// What the tree may ask: means, deviations where they differ, modes where there are several, and the step where the model changes with it.
 fn features(space: &dyn BeliefSpace, automaton: &Automaton) -> Vec<Feature> {
     let n = space.model().state_dim();
     let means = (0..n).map(Feature::Mean);
@@ -125,5 +125,6 @@ fn features(space: &dyn BeliefSpace, automaton: &Automaton) -> Vec<Feature> {
     means
         .chain(deviations)
         .chain(modes.map(Feature::Mode))
+        .chain((space.model().clock() > 0).then_some(Feature::Step))
         .collect()
 }
