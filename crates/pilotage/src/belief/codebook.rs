@@ -1,8 +1,8 @@
 //! Strata of beliefs that no level graph tells apart: everything about a belief but its mean, as one of finitely many.
 
-use super::StratumId;
 use super::full::Moments;
-use crate::model::{ModeId, Model};
+use super::{Belief, StratumId};
+use crate::model::{Interval, ModeId, Model};
 
 /// Strata that two beliefs lie between are told by their covariance and by how likely modes are. Distances are measured between logarithms
 /// of standard deviations, correlations, and square roots of probabilities.
@@ -47,6 +47,13 @@ impl Stratum {
     fn spread(&self) -> f64 {
         let n = (self.covariance.len() as f64).sqrt() as usize;
         self.code[..n].iter().sum()
+    }
+
+    /// What tells it from others in few numbers: how uncertain it is and, of several modes, how likely each is.
+    fn traits(&self) -> impl Iterator<Item = f64> {
+        let several = self.weights.len() > 1;
+        let weights = self.weights.iter().copied().filter(move |_| several);
+        std::iter::once(self.spread()).chain(weights)
     }
 }
 
@@ -150,6 +157,32 @@ impl Codebook {
             let spread = b.spread().total_cmp(&a.spread());
             a.mode().cmp(&b.mode()).then(spread)
         });
+    }
+
+    /// A belief's mean and the traits of its stratum.
+    pub(crate) fn place(&self, belief: &Belief) -> Vec<f64> {
+        let traits = self.strata[belief.stratum].traits();
+        belief.mean.iter().copied().chain(traits).collect()
+    }
+
+    /// What traits lie between.
+    pub(crate) fn trait_bounds(&self) -> Vec<Interval> {
+        let spreads = || self.strata.iter().map(Stratum::spread);
+        let (low, high) = (
+            spreads().fold(f64::INFINITY, f64::min),
+            spreads().fold(f64::NEG_INFINITY, f64::max),
+        );
+        // All the same is between anything.
+        let spread = match high > low {
+            true => Interval::new(low, high),
+            false => Interval::new(low - 1.0, low + 1.0),
+        };
+        let modes = self
+            .strata
+            .first()
+            .map_or(0, |first| first.traits().count() - 1);
+        let unit = std::iter::repeat_n(Interval::new(0.0, 1.0), modes);
+        std::iter::once(spread).chain(unit).collect()
     }
 
     /// The stratum that is nearest to a belief; `code` is room.

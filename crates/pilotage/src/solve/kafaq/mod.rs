@@ -46,14 +46,13 @@ use crate::solve::Worlds;
 pub use curves::drawn;
 pub use settings::{Rules, Settings};
 
+use crate::belief::StratumId;
 use crate::error::Result;
-use crate::model::{ActionId, Model};
+use crate::model::{ActionId, Model, TrackerKind};
 use crate::progress::Progress;
-use crate::scenario::Scenario;
 use crate::solve::learn::{self, Course};
 use crate::solve::solver::refuse_if;
 use crate::solve::{Learner, Lesson, Problem, refusals};
-use crate::world::{ProblemWorld, World};
 use task::{SOLVER, Task};
 
 /// What a learning run found.
@@ -88,6 +87,8 @@ pub struct Point {
 pub struct RegionValue {
     /// Memory it belongs to.
     pub memory: usize,
+    /// Stratum of the beliefs it is for: the steady level, or any where beliefs are kept in full.
+    pub stratum: StratumId,
     /// Lower corner, in the coordinates of the automaton.
     pub lower: Vec<f64>,
     /// Upper corner.
@@ -139,11 +140,12 @@ impl Learner for Settings {
     }
 
     fn accepts(&self, model: &Model) -> Result<()> {
-        let reason = refusals::reward_missing(model).or_else(|| refusals::steps_differ(model));
+        let reason = refusals::reward_missing(model).or_else(|| match model.body().tracker() {
+            TrackerKind::Linear => refusals::steps_differ(model),
+            _ => refusals::phases(model),
+        });
         refuse_if(SOLVER, model, reason)?;
-        let worlds =
-            || -> Box<dyn World> { Box::new(ProblemWorld::new(&Scenario::assumed(model))) };
-        course(model, &worlds, self).map(drop)
+        task::check(model, self)
     }
 
     fn learn(
