@@ -168,10 +168,13 @@ fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
     });
     for (scenario, entry) in accepted {
         let model = &scenario.model;
-        // Beliefs in full are slow to keep without optimisation: the form that suits them, and on a line the planner itself.
+        // Beliefs in full are slow to keep without optimisation: the form that suits them, and on a line the planner itself. What is learned
+        // has a form of its own.
+        let learned = entry.learns() && !model.body().is_linear();
         let forms = Form::ALL
             .into_iter()
             .filter(|form| match model.is_linear() {
+                _ if learned => *form == Form::Tree,
                 true if entry.name() != "point-based" => true,
                 _ => *form == Form::Tree || (*form == Form::Grid && model.state_dim() == 1),
             });

@@ -271,6 +271,19 @@ impl Updater {
         self.source().and_then(|source| source.text.as_deref())
     }
 
+    /// What keeps beliefs of the whole model, where this one knows only its body.
+    ///
+    /// # Errors
+    /// As [`Updater::coded`].
+    pub(crate) fn whole(&self, model: &Model) -> Result<Self> {
+        match (self.part(), self.codebook()) {
+            (Part::Body, Some(codebook)) => {
+                Self::coded(model, self.kind(), Arc::new(codebook.clone()))
+            }
+            _ => Ok(self.clone()),
+        }
+    }
+
     /// What of its model keeps the belief.
     pub(crate) fn part(&self) -> Part {
         self.source().map_or(Part::Whole, |source| source.part)

@@ -4,7 +4,7 @@ use super::rollout::check_runs;
 use super::solver::{Found, Learner, Plan, Planner, Problem, Request, Solver, accepted};
 use super::{Form, Solution, Solved, compile};
 use crate::error::Result;
-use crate::model::{Model, TrackerKind};
+use crate::model::Model;
 use crate::policy::{Automaton, AutomatonRunner};
 use crate::progress::Progress;
 use crate::scenario::Scenario;
@@ -107,7 +107,7 @@ pub fn learn(
     let model = &scenario.model;
     check_runs("runs", request.runs)?;
     let problem = Problem::new(model, request);
-    let levels = model.tracker() == TrackerKind::Linear;
+    let levels = model.is_linear();
     if levels {
         problem.mdp().check()?;
     }

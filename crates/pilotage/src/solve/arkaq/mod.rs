@@ -11,6 +11,8 @@
 //! The thesis' network makes clusters without end where much is continuous (3.4.6). Here [`Settings::state_limit`] ends exploration,
 //! and the result says so.
 //!
+//! Where no uncertainty levels follow motion and sensor, beliefs are kept in full, and clustered by how uncertain they are as well.
+//!
 //! Beyond the thesis, and what its chapter 7 asks for: vigilance that tunes itself ([`Settings::vigilances`]), merging of states
 //! that agree (`merge`), Watkins' Q(lambda), and a memory of more than one step ([`Settings::depth`]). [`Settings::extended`] has all
 //! four.

@@ -3,7 +3,7 @@
 use super::settings::Settings;
 use crate::belief::{BeliefSpace, Updater};
 use crate::error::Result;
-use crate::model::{Fingerprint, Interval, Model, TrackerKind};
+use crate::model::{Fingerprint, Interval, Model};
 use crate::policy::Automaton;
 use crate::scenario::Scenario;
 use crate::solve::Settings as _;
@@ -77,7 +77,7 @@ impl<'a> Task<'a> {
 /// [`crate::Error::Unsupported`] with the reason, and what [`Task::new`] says where a filter keeps its beliefs.
 pub(super) fn check(model: &Model, settings: &Settings) -> Result<()> {
     settings.validate()?;
-    if model.body().tracker() != TrackerKind::Linear {
+    if !model.body().is_linear() {
         return check_bounds(model);
     }
     let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&Scenario::assumed(model))) };

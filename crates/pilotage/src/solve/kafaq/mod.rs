@@ -9,6 +9,9 @@
 //! collected by neighbourhood and action, and a test with a stated error rate says whether another action is better there
 //! ([`Settings::split_error`]). The printed rules are kept as [`Rules::Printed`].
 //!
+//! Where no uncertainty levels follow motion and sensor, beliefs are kept in full and read as strata, in no order that all of them follow: then
+//! all strata are learned at once, without memory, and the automaton carries the strata.
+//!
 //! Neighbourhoods are the cells of a lattice along the state variables, or along the modes of a motion that mixes them (`axes`).
 //!
 //! 1. *The steady level* (`steady`): Q-learning with Boltzmann exploration; every epoch, best actions, splits, extensions and
@@ -48,7 +51,7 @@ pub use settings::{Rules, Settings};
 
 use crate::belief::StratumId;
 use crate::error::Result;
-use crate::model::{ActionId, Model, TrackerKind};
+use crate::model::{ActionId, Model};
 use crate::progress::Progress;
 use crate::solve::learn::{self, Course};
 use crate::solve::solver::refuse_if;
@@ -140,9 +143,9 @@ impl Learner for Settings {
     }
 
     fn accepts(&self, model: &Model) -> Result<()> {
-        let reason = refusals::reward_missing(model).or_else(|| match model.body().tracker() {
-            TrackerKind::Linear => refusals::steps_differ(model),
-            _ => refusals::phases(model),
+        let reason = refusals::reward_missing(model).or_else(|| match model.body().is_linear() {
+            true => refusals::steps_differ(model),
+            false => refusals::phases(model),
         });
         refuse_if(SOLVER, model, reason)?;
         task::check(model, self)

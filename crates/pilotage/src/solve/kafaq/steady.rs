@@ -1,16 +1,17 @@
 //! SegmentSteadyLevel (Figure 4.5): regions of the most certain level, for one memory, learned by acting.
 //!
 //! Where beliefs are kept in full there is no level that the others lead to. Then all strata are learned at once, each with regions of its
-//! own. What is kept of a stratum and a memory is a *sheet*.
+//! own. What is kept of a stratum and a memory is a *sheet*. As beliefs in full go wherever actions lead them, every other episode follows the
+//! regions themselves, so that there is evidence where the automaton would come to.
 
 use serde::{Deserialize, Serialize};
 
 use super::evidence::Halves;
 use super::memory::{Kind, Memory};
-use super::regions::{Region, Reviser};
+use super::regions::{Region, Reviser, actions_by_cell};
 use super::task::Task;
 use crate::belief::Belief;
-use crate::model::Then;
+use crate::model::{ActionId, Then};
 use crate::random::uniform;
 use crate::solve::learn::{Actor, Experience, Table, Transition, boltzmann};
 
@@ -201,8 +202,11 @@ impl Steady {
             reward: 0.0,
         };
         let mut actor = task.actor();
+        let ruling = self.ruling(task);
         while earned.steps < least {
-            self.run_episode(task, &mut actor, experience, &mut earned);
+            let followed = ruling.as_deref();
+            let followed = followed.filter(|_| experience.episodes.is_multiple_of(2));
+            self.run_episode(task, &mut actor, followed, experience, &mut earned);
         }
         self.epoch += 1;
         let worth = settings.worth * (1.0 - task.discount()) * self.mean_value(task);
@@ -215,10 +219,18 @@ impl Steady {
         earned
     }
 
+    /// By sheet and cell: the action of its region, where regions are followed.
+    fn ruling(&self, task: &Task<'_>) -> Option<Vec<Vec<ActionId>>> {
+        let of = |regions: &Vec<Region>| actions_by_cell(&task.lattice, regions);
+        let followed = task.space.as_mdp().is_none();
+        followed.then(|| self.regions.iter().map(of).collect())
+    }
+
     fn run_episode(
         &mut self,
         task: &Task<'_>,
         actor: &mut Actor<'_>,
+        followed: Option<&[Vec<ActionId>]>,
         experience: &mut Experience,
         earned: &mut Earned,
     ) {
@@ -232,7 +244,10 @@ impl Steady {
             let row = self.row(task, sheet, cell);
             let temperature = self.temperature * experience.reward_range();
             let explore = task.settings.explore;
-            let action = boltzmann(self.table.row(row), temperature, explore, &mut exploration);
+            let action = match followed {
+                Some(ruling) if uniform(&mut exploration) >= explore => ruling[sheet][cell],
+                _ => boltzmann(self.table.row(row), temperature, explore, &mut exploration),
+            };
             let step = actor.step(action, &mut draws);
             experience.collect(step.reward);
             earned.steps += 1;

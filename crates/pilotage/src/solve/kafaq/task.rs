@@ -5,7 +5,7 @@ use super::lattice::{Lattice, boxes_needed, cells_needed};
 use super::settings::{Rules, Settings};
 use crate::belief::{BeliefMdp, BeliefSpace, StratumId, Updater};
 use crate::error::Result;
-use crate::model::{Fingerprint, Model, TrackerKind};
+use crate::model::{Fingerprint, Model};
 use crate::policy::{Automaton, Coordinates, MOST_COORDINATES};
 use crate::scenario::Scenario;
 use crate::solve::Settings as _;
@@ -44,7 +44,7 @@ impl<'a> Task<'a> {
         settings.validate()?;
         let fingerprint = model.fingerprint();
         let body = model.body();
-        let in_full = body.tracker() != TrackerKind::Linear;
+        let in_full = !body.is_linear();
         if in_full {
             check_in_full(&body, &settings)?;
         }
@@ -177,7 +177,7 @@ impl<'a> Task<'a> {
 pub(super) fn check(model: &Model, settings: &Settings) -> Result<()> {
     settings.validate()?;
     let body = model.body();
-    if body.tracker() != TrackerKind::Linear {
+    if !body.is_linear() {
         check_in_full(&body, settings)?;
         return check_bounds(model);
     }
@@ -203,7 +203,7 @@ fn chain(mdp: &BeliefMdp) -> std::result::Result<Vec<StratumId>, String> {
     let levels = mdp.levels();
     if levels.classes().len() > 1 {
         return Err("its actions disturb motion or sensor in different ways, so that uncertainty has no one order of levels to be learned in; \
-                    use value-iteration, or write `tracker = \"sum\"` in [belief]"
+                    use value-iteration"
             .to_owned());
     }
     let start = mdp.start().stratum;

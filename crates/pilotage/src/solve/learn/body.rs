@@ -37,28 +37,27 @@ impl Strata {
     }
 }
 
-/// The beliefs of a body: on uncertainty levels, or in full and read as strata that are found by acting in thought.
+/// The beliefs of a body: on uncertainty levels where these follow it, whatever tracker a model asks for that has more to it. Else in full,
+/// and read as strata that are found by acting in thought.
 ///
 /// # Errors
 /// As [`BeliefMdp::check`] and [`CellsKeeping::new`].
 pub(crate) fn beliefs(body: &Model, strata: Strata) -> Result<Box<dyn BeliefSpace>> {
-    Ok(match body.tracker() {
-        TrackerKind::Linear => {
-            let mdp = BeliefMdp::new(body);
-            mdp.check()?;
-            Box::new(mdp)
-        }
+    if body.is_linear() {
+        let mdp = BeliefMdp::new(body);
+        mdp.check()?;
+        return Ok(Box::new(mdp));
+    }
+    Ok(Box::new(match body.tracker() {
         TrackerKind::Cells => {
             let keeping = Arc::new(CellsKeeping::new(body)?);
-            Box::new(in_full(body, keeping, Updater::Cells, strata))
+            in_full(body, keeping, Updater::Cells, strata)
         }
-        _ => Box::new(in_full(
-            body,
-            Arc::new(SumKeeping::new(body)),
-            Updater::Sum,
-            strata,
-        )),
-    })
+        _ => {
+            let keeping = Arc::new(SumKeeping::new(body));
+            in_full(body, keeping, Updater::Sum, strata)
+        }
+    }))
 }
 
 fn in_full<K: Keeping>(
