@@ -26,8 +26,8 @@ fn regions() -> kafaq::Settings {
 
 fn clusters() -> arkaq::Settings {
     arkaq::Settings {
-        vigilances: vec![0.95],
-        depth: 0,
+        vigilances: vec![0.96],
+        state_limit: 400,
         strata: 12,
         walks: 50,
         explore_limit: 10_000,

@@ -30,6 +30,10 @@ const MODES: f64 = 2.0;
 /// A belief that is so many times narrower than the start, or than the bounds, is certain.
 const CERTAIN: f64 = 1e-3;
 
+/// Most beliefs that strata are brought near to, and most that they are chosen among.
+const LOOKED_AT: usize = 4_000;
+const CANDIDATES: usize = 400;
+
 /// A belief lies between so many strata.
 const BETWEEN: usize = 4;
 
@@ -149,6 +153,41 @@ impl Codebook {
             added.push(farthest);
         }
         added
+    }
+
+    /// Adds strata of beliefs, each time the one by which beliefs come nearest to a stratum on the whole, until all are nearer than `apart` or
+    /// there are `most`: what is met often counts more than what is far from everything.
+    pub(crate) fn represent(&mut self, met: &[Moments], apart: f64, most: usize) {
+        let sample = |size: usize| met.iter().step_by(met.len().div_ceil(size).max(1));
+        let coded = |moments: &Moments| {
+            let mut code = Vec::new();
+            self.write_code(moments, &mut code);
+            code
+        };
+        let codes: Vec<Vec<f64>> = sample(LOOKED_AT).map(coded).collect();
+        let candidates: Vec<(&Moments, Vec<f64>)> = sample(CANDIDATES)
+            .map(|moments| (moments, coded(moments)))
+            .collect();
+        let mut gaps = vec![f64::INFINITY; codes.len()];
+        while self.strata.len() < most && gaps.iter().any(|gap| *gap > apart) {
+            let left = |(_, code): &(&Moments, Vec<f64>)| -> f64 {
+                let pairs = gaps.iter().zip(&codes);
+                pairs
+                    .map(|(gap, other)| gap.min(distance(code, other)))
+                    .sum()
+            };
+            let left: Vec<f64> = candidates.iter().map(left).collect();
+            let best = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]));
+            // None of the candidates brings anything nearer.
+            let Some(best) = best.filter(|&best| left[best] < gaps.iter().sum()) else {
+                break;
+            };
+            let (moments, code) = &candidates[best];
+            for (gap, other) in gaps.iter_mut().zip(&codes) {
+                *gap = gap.min(distance(code, other));
+            }
+            self.add(moments);
+        }
     }
 
     /// Orders strata by their most likely mode, and from wide to narrow within it, as uncertainty levels are.

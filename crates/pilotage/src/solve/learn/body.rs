@@ -69,7 +69,7 @@ fn in_full<K: Keeping>(
     let met = meet(body, keeping.as_ref(), None, strata.walks, strata.seed);
     let moments: Vec<Moments> = met.into_iter().map(|met| met.moments).collect();
     let mut codebook = Codebook::new(body);
-    codebook.cover(&moments, APART, strata.most);
+    codebook.represent(&moments, APART, strata.most);
     codebook.sort();
     let codebook = Arc::new(codebook);
     let updater = updater(Coded::new(body, keeping, Arc::clone(&codebook)));
