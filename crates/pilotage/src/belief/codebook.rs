@@ -290,3 +290,38 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
         .sum::<f64>()
         .sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of_deviation(deviation: f64) -> Moments {
+        Moments {
+            mean: vec![0.0],
+            covariance: vec![deviation * deviation],
+            weights: vec![1.0],
+        }
+    }
+
+    /// Forty beliefs like one, thirty like another, and a stray.
+    #[test]
+    fn what_is_met_often_is_represented_before_what_is_far_from_everything() {
+        let mut met = vec![of_deviation(1.0); 40];
+        met.extend(vec![of_deviation(3.0); 30]);
+        met.push(of_deviation(1e-3));
+        let empty = || Codebook::of(vec![1e-6], []);
+        let variances = |codebook: &Codebook| -> Vec<f64> {
+            let strata = (0..codebook.len()).map(|id| codebook.stratum(id));
+            strata.map(|stratum| stratum.covariance[0]).collect()
+        };
+        let mut often = empty();
+        often.represent(&met, 0.1, 2);
+        assert_eq!(variances(&often), [1.0, 9.0]);
+        let mut far = empty();
+        far.cover(&met, 0.1, 2);
+        assert!(variances(&far).contains(&1e-6));
+        // All are near one: no more are needed.
+        often.represent(&met, 0.1, 10);
+        assert_eq!(often.len(), 3);
+    }
+}
