@@ -12,7 +12,7 @@ pub enum Part {
     /// All of it.
     #[default]
     Whole,
-    /// Its [body](Model::body).
+    /// What a learner is told of it: how it moves and senses, where it starts, and modes only as far as these depend on them.
     Body,
 }
 
