@@ -1,8 +1,8 @@
 //! Strata of beliefs that no level graph tells apart: everything about a belief but its mean, as one of finitely many.
 
-use super::StratumId;
 use super::full::Moments;
-use crate::model::{ModeId, Model};
+use super::{Belief, StratumId};
+use crate::model::{Interval, ModeId, Model};
 
 /// Strata that two beliefs lie between are told by their covariance and by how likely modes are and, where a model changes with the step of
 /// the episode, by the step. Distances are measured between logarithms of standard deviations, correlations, and square roots of
@@ -38,6 +38,10 @@ const STEP: f64 = 0.5;
 /// A belief that is so many times narrower than the start, or than the bounds, is certain.
 const CERTAIN: f64 = 1e-3;
 
+/// Most beliefs that strata are brought near to, and most that they are chosen among.
+const LOOKED_AT: usize = 4_000;
+const CANDIDATES: usize = 400;
+
 /// A belief lies between so many strata.
 const BETWEEN: usize = 4;
 
@@ -55,6 +59,13 @@ impl Stratum {
     fn spread(&self) -> f64 {
         let n = (self.covariance.len() as f64).sqrt() as usize;
         self.code[..n].iter().sum()
+    }
+
+    /// What tells it from others in few numbers: how uncertain it is and, of several modes, how likely each is.
+    fn traits(&self) -> impl Iterator<Item = f64> {
+        let several = self.weights.len() > 1;
+        let weights = self.weights.iter().copied().filter(move |_| several);
+        std::iter::once(self.spread()).chain(weights)
     }
 }
 
@@ -166,12 +177,73 @@ impl Codebook {
         added
     }
 
+    /// Adds strata of beliefs, each time the one by which beliefs come nearest to a stratum on the whole, until all are nearer than `apart` or
+    /// there are `most`: what is met often counts more than what is far from everything.
+    pub(crate) fn represent(&mut self, met: &[Moments], apart: f64, most: usize) {
+        let sample = |size: usize| met.iter().step_by(met.len().div_ceil(size).max(1));
+        let coded = |moments: &Moments| {
+            let mut code = Vec::new();
+            self.write_code(moments, &mut code);
+            code
+        };
+        let codes: Vec<Vec<f64>> = sample(LOOKED_AT).map(coded).collect();
+        let candidates: Vec<(&Moments, Vec<f64>)> = sample(CANDIDATES)
+            .map(|moments| (moments, coded(moments)))
+            .collect();
+        let mut gaps = vec![f64::INFINITY; codes.len()];
+        while self.strata.len() < most && gaps.iter().any(|gap| *gap > apart) {
+            let left = |(_, code): &(&Moments, Vec<f64>)| -> f64 {
+                let pairs = gaps.iter().zip(&codes);
+                pairs
+                    .map(|(gap, other)| gap.min(distance(code, other)))
+                    .sum()
+            };
+            let left: Vec<f64> = candidates.iter().map(left).collect();
+            let best = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]));
+            // None of the candidates brings anything nearer.
+            let Some(best) = best.filter(|&best| left[best] < gaps.iter().sum()) else {
+                break;
+            };
+            let (moments, code) = &candidates[best];
+            for (gap, other) in gaps.iter_mut().zip(&codes) {
+                *gap = gap.min(distance(code, other));
+            }
+            self.add(moments);
+        }
+    }
+
     /// Orders strata by their most likely mode, and from wide to narrow within it, as uncertainty levels are.
     pub fn sort(&mut self) {
         self.strata.sort_by(|a, b| {
             let spread = b.spread().total_cmp(&a.spread());
             a.mode().cmp(&b.mode()).then(spread)
         });
+    }
+
+    /// A belief's mean and the traits of its stratum.
+    pub(crate) fn place(&self, belief: &Belief) -> Vec<f64> {
+        let traits = self.strata[belief.stratum].traits();
+        belief.mean.iter().copied().chain(traits).collect()
+    }
+
+    /// What traits lie between.
+    pub(crate) fn trait_bounds(&self) -> Vec<Interval> {
+        let spreads = || self.strata.iter().map(Stratum::spread);
+        let (low, high) = (
+            spreads().fold(f64::INFINITY, f64::min),
+            spreads().fold(f64::NEG_INFINITY, f64::max),
+        );
+        // All the same is between anything.
+        let spread = match high > low {
+            true => Interval::new(low, high),
+            false => Interval::new(low - 1.0, low + 1.0),
+        };
+        let modes = self
+            .strata
+            .first()
+            .map_or(0, |first| first.traits().count() - 1);
+        let unit = std::iter::repeat_n(Interval::new(0.0, 1.0), modes);
+        std::iter::once(spread).chain(unit).collect()
     }
 
     /// The stratum that is nearest to a belief; `code` is room.
@@ -242,4 +314,40 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
         .map(|(a, b)| (a - b) * (a - b))
         .sum::<f64>()
         .sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of_deviation(deviation: f64) -> Moments {
+        Moments {
+            mean: vec![0.0],
+            covariance: vec![deviation * deviation],
+            weights: vec![1.0],
+            step: 0,
+        }
+    }
+
+    /// Forty beliefs like one, thirty like another, and a stray.
+    #[test]
+    fn what_is_met_often_is_represented_before_what_is_far_from_everything() {
+        let mut met = vec![of_deviation(1.0); 40];
+        met.extend(vec![of_deviation(3.0); 30]);
+        met.push(of_deviation(1e-3));
+        let empty = || Codebook::of(vec![1e-6], 0, []);
+        let variances = |codebook: &Codebook| -> Vec<f64> {
+            let strata = (0..codebook.len()).map(|id| codebook.stratum(id));
+            strata.map(|stratum| stratum.covariance[0]).collect()
+        };
+        let mut often = empty();
+        often.represent(&met, 0.1, 2);
+        assert_eq!(variances(&often), [1.0, 9.0]);
+        let mut far = empty();
+        far.cover(&met, 0.1, 2);
+        assert!(variances(&far).contains(&1e-6));
+        // All are near one: no more are needed.
+        often.represent(&met, 0.1, 10);
+        assert_eq!(often.len(), 3);
+    }
 }

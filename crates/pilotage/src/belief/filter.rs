@@ -3,9 +3,10 @@
 use nalgebra::DMatrix;
 
 use super::levels::{LevelGraph, StratumId};
+use super::memory::Memory;
 use super::reading::Reading;
 use super::recall::Recall;
-use crate::model::{ActionId, Barriers, ModeId, Model, Switch, WallBelief, When};
+use crate::model::{ActionId, Barriers, ModeId, Model, Switch, WallBelief};
 
 /// Largest magnitude of a mean, and of any number of a policy.
 ///
@@ -62,11 +63,10 @@ pub struct Filter {
     /// Per phase: `H`, row by row.
     pub(crate) sensor: Vec<f64>,
     pub(crate) actions: usize,
-    pub(crate) switches: Vec<Switch>,
+    /// How the mode changes.
+    pub(crate) memory: Memory,
     /// The walls, where the belief knows of them.
     pub(crate) walls: Option<Barriers>,
-    /// Where it decides on modes, instead of the switches.
-    pub(crate) recall: Option<Recall>,
 }
 
 impl Filter {
@@ -125,17 +125,15 @@ impl Filter {
                 .flat_map(|step| by_row(&model.sensor_at(step).h))
                 .collect(),
             actions,
-            switches,
+            memory: Memory::Switches(switches),
             walls: (model.belief.walls == WallBelief::Clip).then(|| Barriers::new(model)),
-            recall: None,
         }
     }
 
     /// The same filter with modes that are what is remembered of clusters, from the start on.
     pub fn recalling(mut self, recall: Recall) -> Self {
         self.start.1 = recall.first(&self.start.2);
-        self.recall = Some(recall);
-        self.switches.clear();
+        self.memory = Memory::Recall(recall);
         self
     }
 
@@ -180,7 +178,7 @@ impl Filter {
         scratch: &mut [f64],
     ) {
         let time = self.times[belief.stratum];
-        let before = self.switch(When::Before, belief, action, time);
+        let before = self.memory.before(belief, action, time);
         let (n, edge) = (self.states, self.edge(belief.stratum, action));
         let phase = self.phases[belief.stratum];
         self.predict(belief, action, scratch);
@@ -206,20 +204,9 @@ impl Filter {
         if let Some(walls) = &self.walls {
             walls.confine(&mut belief.mean);
         }
-        if let Some(recall) = &self.recall {
-            belief.mode = recall.next(belief.mode, action, &belief.mean);
-            return;
-        }
-        let becomes = before.or_else(|| self.switch(When::After, belief, action, time));
-        belief.mode = becomes.unwrap_or(belief.mode);
-    }
-
-    /// The mode afterwards of the first change that happens.
-    fn switch(&self, when: When, belief: &Belief, action: ActionId, time: usize) -> Option<ModeId> {
-        let doing = (belief.mode, action);
-        let mut switches = self.switches.iter();
-        let switch = switches.find(|switch| switch.happens(when, doing, time, &belief.mean));
-        switch.map(|switch| switch.becomes)
+        belief.mode = self
+            .memory
+            .after(before, belief, (action, time), &belief.mean);
     }
 
     /// Writes the mean expected after an action, before anything is sensed, to `predicted` (length `n`).

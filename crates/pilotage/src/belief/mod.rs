@@ -9,7 +9,7 @@
 //!
 //! Beneath these are the [`LevelGraph`] of the covariances that a filter can have, the [`KalmanFilter`] of the textbook and its
 //! [steady state](riccati), and probabilities under a [Gaussian](gaussian). A [`HypothesisTracker`] keeps several beliefs with a weight
-//! each, and [`Recall`] remembers where beliefs were.
+//! each, and a [`Memory`] remembers where beliefs were and what was done there.
 
 mod cells;
 mod codebook;
@@ -20,6 +20,7 @@ mod hypotheses;
 pub(crate) mod kalman;
 mod levels;
 mod mdp;
+mod memory;
 mod mixture;
 mod nearby;
 mod reading;
@@ -40,6 +41,7 @@ pub use hypotheses::{Hypothesis, HypothesisSettings, HypothesisTracker, Merge};
 pub use kalman::{Correction, KalmanFilter};
 pub use levels::{ClassId, LevelGraph, StratumId};
 pub use mdp::{BeliefMdp, Survival};
+pub use memory::Memory;
 pub use reading::Reading;
 pub(crate) use recall::ClusterId;
 pub use recall::{Clusters, Recall};

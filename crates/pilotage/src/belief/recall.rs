@@ -1,6 +1,6 @@
 //! Memory by clusters (thesis 3.2): what is remembered is the clusters that the last beliefs fell into, and the actions between them.
 //!
-//! The mean of a belief falls into the nearest cluster. A mode of the belief stands for what is remembered, so that modes in the same
+//! The mean of a belief falls into the nearest cluster; where a belief is kept in full, its place has more than a mean. A mode of the belief stands for what is remembered, so that modes in the same
 //! cluster with different pasts can tell what no sensor shows. How modes follow one another is a table: a finite automaton that is fed
 //! with actions and clusters.
 
@@ -11,11 +11,12 @@ use crate::model::{ActionId, Interval, ModeId, Model};
 /// Number of a cluster.
 pub(crate) type ClusterId = usize;
 
-/// Clusters of belief means: a mean is in the one whose centre is nearest, lengths measured by the world's outer bounds.
+/// Clusters of belief means: a mean is in the one whose centre is nearest, lengths measured by the world's outer bounds. Where beliefs are
+/// kept in full, the traits of a stratum follow the mean.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Clusters {
     pub(crate) bounds: Vec<Interval>,
-    /// By cluster, length `n`, in units of the state.
+    /// By cluster, length `n` and a number for each trait, in units of the state and the traits.
     pub(crate) centres: Vec<Vec<f64>>,
 }
 
@@ -37,6 +38,11 @@ impl Clusters {
             bounds: model.state.iter().map(|variable| variable.bounds).collect(),
             centres,
         }
+    }
+
+    /// Clusters, at least one, of places that lie between the given ends.
+    pub(crate) fn between_ends(bounds: Vec<Interval>, centres: Vec<Vec<f64>>) -> Self {
+        Self { bounds, centres }
     }
 
     /// Number of clusters.

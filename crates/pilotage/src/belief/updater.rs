@@ -1,15 +1,17 @@
 //! What keeps the belief of an agent, whatever kind it is: the Kalman filter on its levels, or a belief in full that is read by a codebook.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::codebook::Codebook;
 use super::full::{Acted, Keeping, Moments};
+use super::memory::Memory;
 use super::{
     Belief, BeliefMdp, BeliefSpace, Cells, CellsKeeping, CodedSpace, Filter, Reading, SumKeeping,
     Tracker, Tracking,
 };
 use crate::error::Result;
-use crate::model::{ActionId, Model, ModelText, TrackerKind};
+use crate::model::{ActionId, Interval, Model, ModelText, Part, TrackerKind};
 
 /// Keeps beliefs, and reads them as a stratum, a mode and a mean. It does not change: what changes is a [`Held`] belief.
 // There are few at a time, so their size does not matter.
@@ -42,6 +44,8 @@ pub struct Coded<K> {
     codebook: Arc<Codebook>,
     text: ModelText,
     readings: usize,
+    /// What the mode is, where the stratum does not say it.
+    memory: Option<Memory>,
 }
 
 /// A belief as it is held from step to step.
@@ -74,13 +78,17 @@ impl<K> Clone for Coded<K> {
             codebook: Arc::clone(&self.codebook),
             text: self.text.clone(),
             readings: self.readings,
+            memory: self.memory.clone(),
         }
     }
 }
 
 impl<K> PartialEq for Coded<K> {
     fn eq(&self, other: &Self) -> bool {
-        self.text.0 == other.text.0 && self.codebook == other.codebook
+        let of = |text: &ModelText| (text.text.clone(), text.part);
+        of(&self.text) == of(&other.text)
+            && self.codebook == other.codebook
+            && self.memory == other.memory
     }
 }
 
@@ -92,6 +100,7 @@ impl<K: Keeping> Coded<K> {
             codebook,
             text: model.text.clone(),
             readings: model.observation_dim(),
+            memory: None,
         }
     }
 
@@ -113,6 +122,9 @@ impl<K: Keeping> Coded<K> {
             mean: Vec::new(),
         };
         self.read(&mut running, &mut read);
+        if let Some(Memory::Recall(recall)) = &self.memory {
+            read.mode = recall.first(&self.codebook.place(&read));
+        }
         (running, read)
     }
 
@@ -128,16 +140,24 @@ impl<K: Keeping> Coded<K> {
         reading: Reading<'_>,
     ) {
         let step = running.step;
+        let memory = self.memory.as_ref();
+        let before = memory.and_then(|memory| memory.before(read, action, step));
         self.keeping.sense(&mut running.full, action, step, reading);
         running.step += 1;
         self.read(running, read);
+        if let Some(memory) = memory {
+            let place = self.codebook.place(read);
+            read.mode = memory.after(before, read, (action, step), &place);
+        }
     }
 
     fn read(&self, running: &mut Running<K::Full>, read: &mut Belief) {
         self.keeping.moments(&running.full, &mut running.moments);
         running.moments.step = running.step;
         read.stratum = self.codebook.nearest(&running.moments, &mut running.code);
-        read.mode = self.codebook.stratum(read.stratum).mode();
+        if self.memory.is_none() {
+            read.mode = self.codebook.stratum(read.stratum).mode();
+        }
         read.mean.clone_from(&running.moments.mean);
     }
 }
@@ -210,12 +230,71 @@ impl Updater {
         }
     }
 
+    /// The same with modes that are what is remembered, whatever the belief says of modes. By switches, a belief in full begins in mode 0.
+    pub fn remembering(mut self, memory: Memory) -> Self {
+        match (&mut self, memory) {
+            (Self::Linear(filter), Memory::Recall(recall)) => {
+                return filter.clone().recalling(recall).into();
+            }
+            (Self::Linear(filter), memory) => filter.memory = memory,
+            (Self::Sum(coded), memory) => coded.memory = Some(memory),
+            (Self::Cells(coded), memory) => coded.memory = Some(memory),
+        }
+        self
+    }
+
+    /// How the mode changes; `None` where it is what a belief in full says.
+    pub(crate) fn memory(&self) -> Option<&Memory> {
+        match self {
+            Self::Linear(filter) => Some(&filter.memory),
+            Self::Sum(coded) => coded.memory.as_ref(),
+            Self::Cells(coded) => coded.memory.as_ref(),
+        }
+    }
+
+    /// Where a belief is among [clusters](super::Clusters): its mean and, where it is kept in full, the traits of its stratum.
+    pub(crate) fn place<'a>(&self, belief: &'a Belief) -> Cow<'a, [f64]> {
+        match self.codebook() {
+            Some(codebook) => codebook.place(belief).into(),
+            None => belief.mean.as_slice().into(),
+        }
+    }
+
+    /// What such places lie between, for the model that it was made for.
+    pub(crate) fn extents(&self, model: &Model) -> Vec<Interval> {
+        let bounds = model.state.iter().map(|variable| variable.bounds);
+        let traits = self.codebook().map(Codebook::trait_bounds);
+        bounds.chain(traits.into_iter().flatten()).collect()
+    }
+
     /// The text of the model by which beliefs in full are kept, if it was read from a text.
     pub(crate) fn model_text(&self) -> Option<&str> {
+        self.source().and_then(|source| source.text.as_deref())
+    }
+
+    /// What keeps beliefs of the whole model, where this one knows only its body.
+    ///
+    /// # Errors
+    /// As [`Updater::coded`].
+    pub(crate) fn whole(&self, model: &Model) -> Result<Self> {
+        match (self.part(), self.codebook()) {
+            (Part::Body, Some(codebook)) => {
+                Self::coded(model, self.kind(), Arc::new(codebook.clone()))
+            }
+            _ => Ok(self.clone()),
+        }
+    }
+
+    /// What of its model keeps the belief.
+    pub(crate) fn part(&self) -> Part {
+        self.source().map_or(Part::Whole, |source| source.part)
+    }
+
+    fn source(&self) -> Option<&ModelText> {
         match self {
             Self::Linear(_) => None,
-            Self::Sum(coded) => coded.text.0.as_deref(),
-            Self::Cells(coded) => coded.text.0.as_deref(),
+            Self::Sum(coded) => Some(&coded.text),
+            Self::Cells(coded) => Some(&coded.text),
         }
     }
 

@@ -16,6 +16,7 @@
 //! [`ModelError`] one with its place in a file, and a [`Fingerprint`] tells whether two models are the same problem.
 
 mod barriers;
+mod body;
 mod builder;
 mod dynamics;
 mod effects;
@@ -34,6 +35,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use barriers::{Barriers, Stop};
+pub use body::Part;
 pub use builder::{Clause, ModelBuilder};
 pub(crate) use dynamics::wrapped;
 pub use dynamics::{Doing, Dynamics};
@@ -101,7 +103,12 @@ pub struct Model {
 
 /// The text that a model was read from, if it was. Models that say the same are the same, whatever their text.
 #[derive(Debug, Clone, Default)]
-pub struct ModelText(pub Option<Arc<str>>);
+pub struct ModelText {
+    /// The text.
+    pub text: Option<Arc<str>>,
+    /// What of it the model is.
+    pub part: Part,
+}
 
 impl PartialEq for ModelText {
     fn eq(&self, _: &Self) -> bool {

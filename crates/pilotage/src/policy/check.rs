@@ -94,6 +94,10 @@ struct Sizes {
     nodes: usize,
     /// Numbers of a place of a node.
     coordinates: usize,
+    /// Numbers of the place of a belief among clusters.
+    traits: usize,
+    /// Whether modes are what is remembered, and no belief.
+    remembers: bool,
 }
 
 impl Sizes {
@@ -135,6 +139,11 @@ impl PolicyTable {
                 None => self.states.len(),
                 Some(coordinates) => coordinates.len(),
             },
+            traits: match &self.belief {
+                None => 0,
+                Some(belief) => belief.strata.first().map_or(0, StratumTable::traits),
+            },
+            remembers: self.memory.is_some(),
         };
         plain(&self.problem).at("problem")?;
         plain(&self.solver).at("solver")?;
@@ -271,7 +280,11 @@ impl BeliefTable {
              }| {
                 matrix(matrix_, sizes.states, sizes.states).at("covariance")?;
                 covariance(matrix_, largest).at("covariance")?;
-                vector(modes, sizes.modes).at("modes")?;
+                let probabilities = match sizes.remembers {
+                    true => modes.len(),
+                    false => sizes.modes,
+                };
+                vector(modes, probabilities).at("modes")?;
                 let sum: f64 = modes.iter().sum();
                 match modes.iter().all(|weight| *weight >= 0.0) && (sum - 1.0).abs() < 1e-6 {
                     true => Ok(()),
@@ -280,6 +293,17 @@ impl BeliefTable {
             },
         )
         .at("strata")
+    }
+}
+
+impl StratumTable {
+    /// Numbers that tell where it is among clusters.
+    fn traits(&self) -> usize {
+        1 + if self.modes.len() > 1 {
+            self.modes.len()
+        } else {
+            0
+        }
     }
 }
 
@@ -353,11 +377,12 @@ impl SwitchTable {
 
 impl RecallTable {
     fn check(&self, sizes: &Sizes) -> Checked {
-        length(&self.bounds, sizes.states).at("bounds")?;
+        let axes = sizes.states + sizes.traits;
+        length(&self.bounds, axes).at("bounds")?;
         each(&self.bounds, |bounds| rising(&bounds.map(Some))).at("bounds")?;
         let clusters = self.centres.len();
         some(&self.centres).at("centres")?;
-        each(&self.centres, |centre| vector(centre, sizes.states)).at("centres")?;
+        each(&self.centres, |centre| vector(centre, axes)).at("centres")?;
         length(&self.first, clusters).at("first")?;
         each(&self.first, |mode| sizes.mode(mode)).at("first")?;
         length(&self.next, sizes.modes).at("next")?;

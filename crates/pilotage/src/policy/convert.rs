@@ -9,8 +9,10 @@ use super::file::{
 use super::{Automaton, Coordinates, Node, Observed, Tree};
 use std::sync::Arc;
 
-use crate::belief::{Clusters, Codebook, Filter, Recall, Updater};
-use crate::model::{Barriers, Fingerprint, Interval, Model, Region, Step, Steps, Switch, map};
+use crate::belief::{Clusters, Codebook, Filter, Memory, Recall, Updater};
+use crate::model::{
+    Barriers, Fingerprint, Interval, Model, Part, Region, Step, Steps, Switch, map,
+};
 
 /// Rows of a matrix that lies row by row in `numbers`.
 fn rows(numbers: &[f64], columns: usize) -> Rows {
@@ -56,7 +58,7 @@ impl PolicyTable {
             start: filter.map(start),
             filter: filter.map(table).transpose()?,
             belief: belief_table(automaton).at("belief")?,
-            memory: filter.and_then(memory),
+            memory: memory(&automaton.updater),
             matching: automaton.matching,
             coordinates: automaton.coordinates.as_ref().map(coordinate_tables),
             scale: automaton.scale.clone(),
@@ -87,28 +89,28 @@ impl PolicyTable {
             }
             (None, None) => Vec::new(),
         };
-        let (switches, recall) = match self.memory {
-            None => (Vec::new(), None),
-            Some(MemoryTable::Switches(switches)) => (
-                switches.into_iter().map(SwitchTable::switch).collect(),
-                None,
-            ),
-            Some(MemoryTable::Recall(recall)) => {
-                (Vec::new(), Some(recall.recall(self.actions.len())))
-            }
-        };
+        let actions = self.actions.len();
+        let memory = self.memory.map(|memory| memory.memory(actions));
         Ok(Automaton {
             problem: self.problem,
             fingerprint: self.fingerprint,
             solver: self.solver,
             matching: self.matching,
             updater: match (self.filter, self.start, self.belief) {
-                (Some(filter), Some(start), _) => Updater::Linear(Filter {
-                    switches,
-                    recall,
-                    ..filter.filter(start).at("filter")?
-                }),
-                (_, _, Some(belief)) => belief.updater(self.fingerprint).at("belief")?,
+                (Some(filter), Some(start), _) => {
+                    let filter = filter.filter(start).at("filter")?;
+                    Updater::Linear(Filter {
+                        memory: memory.unwrap_or(filter.memory),
+                        ..filter
+                    })
+                }
+                (_, _, Some(belief)) => {
+                    let updater = belief.updater(self.fingerprint).at("belief")?;
+                    match memory {
+                        Some(memory) => updater.remembering(memory),
+                        None => updater,
+                    }
+                }
                 _ => {
                     return Err(Fault::new(
                         "neither a filter with a start nor a belief".to_owned(),
@@ -158,6 +160,7 @@ fn belief_table(automaton: &Automaton) -> Checked<Option<BeliefTable>> {
     let table = BeliefTable {
         tracker: automaton.updater.kind(),
         model: text.to_owned(),
+        of: automaton.updater.part(),
         certain: codebook.floors().to_vec(),
         strata: strata.collect(),
     };
@@ -181,6 +184,20 @@ impl BeliefTable {
 
     fn updater(self, fingerprint: Fingerprint) -> Checked<Updater> {
         let model = self.model(fingerprint).at("model")?;
+        let model = match self.of {
+            Part::Whole => model,
+            Part::Body => model.body(),
+        };
+        let modes = model.modes.len();
+        if let Some(stratum) = (self.strata.iter()).position(|stratum| stratum.modes.len() != modes)
+        {
+            let known = self.strata[stratum].modes.len();
+            let message = format!("{known} probabilities, and the belief is about {modes} modes");
+            return Err(Fault::new(message))
+                .at("modes")
+                .item(stratum)
+                .at("strata");
+        }
         let strata = self.strata.into_iter();
         let strata =
             strata.map(|stratum| (stratum.covariance.concat(), stratum.modes, stratum.step));
@@ -278,13 +295,12 @@ impl FilterTable {
             displacements: phases(&self.bu, |phase| &phase.bu),
             sensor: phases(&self.h, |phase| &phase.h),
             actions: self.bu.len(),
-            switches: Vec::new(),
+            memory: Memory::Switches(Vec::new()),
             walls: self
                 .walls
                 .map(WallsTable::barriers)
                 .transpose()
                 .at("walls")?,
-            recall: None,
         })
     }
 }
@@ -348,14 +364,31 @@ impl WallsTable {
     }
 }
 
-/// How the mode changes; `None` where it does not.
-fn memory(filter: &Filter) -> Option<MemoryTable> {
-    if let Some(recall) = &filter.recall {
-        return Some(MemoryTable::Recall(RecallTable::new(recall)));
+/// How the mode changes; `None` where it does not, or where a belief in full says what it is.
+fn memory(updater: &Updater) -> Option<MemoryTable> {
+    let memory = updater.memory()?;
+    let stays = *memory == Memory::Switches(Vec::new());
+    (updater.codebook().is_some() || !stays).then(|| MemoryTable::new(memory))
+}
+
+impl MemoryTable {
+    fn new(memory: &Memory) -> Self {
+        match memory {
+            Memory::Switches(switches) => {
+                Self::Switches(switches.iter().map(SwitchTable::new).collect())
+            }
+            Memory::Recall(recall) => Self::Recall(RecallTable::new(recall)),
+        }
     }
-    let switches = filter.switches.iter().map(SwitchTable::new);
-    let switches: Vec<SwitchTable> = switches.collect();
-    (!switches.is_empty()).then_some(MemoryTable::Switches(switches))
+
+    fn memory(self, actions: usize) -> Memory {
+        match self {
+            Self::Switches(switches) => {
+                Memory::Switches(switches.into_iter().map(SwitchTable::switch).collect())
+            }
+            Self::Recall(recall) => Memory::Recall(recall.recall(actions)),
+        }
+    }
 }
 
 impl SwitchTable {

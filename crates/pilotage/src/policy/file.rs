@@ -5,7 +5,7 @@ use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 
 use super::{Matching, Place, Test};
-use crate::model::{Fingerprint, TrackerKind, When};
+use crate::model::{Fingerprint, Part, TrackerKind, When};
 
 /// Version of the file format; a file of another is refused.
 pub(super) const FORMAT: u64 = 2;
@@ -99,6 +99,9 @@ pub(super) struct BeliefTable {
     pub tracker: TrackerKind,
     /// The model file by whose laws it is kept, word for word.
     pub model: String,
+    /// What of that model keeps it: the `whole`, or only the `body` that a learner knows. Default: the whole.
+    #[serde(default, skip_serializing_if = "is_whole")]
+    pub of: Part,
     /// Standard deviations below which a belief counts as certain, n numbers above 0.
     pub certain: Vec<f64>,
     /// The strata, at least one. A belief is read as the nearest, by the logarithms of standard deviations, the correlations, twice the
@@ -256,6 +259,10 @@ pub(super) struct SwitchTable {
     pub becomes: usize,
 }
 
+fn is_whole(part: &Part) -> bool {
+    *part == Part::Whole
+}
+
 fn is_zero(number: &usize) -> bool {
     *number == 0
 }
@@ -285,9 +292,10 @@ pub(super) struct SideTable {
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub(super) struct RecallTable {
-    /// By state variable: lower and upper end of the world, by which distances are measured.
+    /// By state variable: lower and upper end of the world, by which distances are measured. Where a belief is kept in full, then by trait of
+    /// its stratum.
     pub bounds: Vec<[f64; 2]>,
-    /// By cluster: its centre, n numbers. A mean is in the cluster whose centre is nearest.
+    /// By cluster: its centre, n numbers, and one more for each trait. A belief is in the cluster whose centre is nearest.
     #[schemars(length(min = 1))]
     pub centres: Vec<Vec<f64>>,
     /// By cluster: the mode of an episode that starts in it. The start above has it already.

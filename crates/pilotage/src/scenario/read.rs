@@ -9,7 +9,7 @@ use super::file::ModelFile;
 use super::locate::locate;
 use super::resolve::resolve;
 use crate::files::read as read_file;
-use crate::model::{Fault, ModelError, ModelText, Place, error, suggest};
+use crate::model::{Fault, ModelError, ModelText, Part, Place, error, suggest};
 
 /// Version of the file format that [`read`] reads.
 const FORMAT: u64 = 1;
@@ -38,7 +38,10 @@ pub fn read(text: &str, origin: &str) -> Result<Scenario, ModelError> {
             .and_then(ModelFile::deserialize)
             .map_err(|error| in_our_words(&error))?;
         let mut scenario = resolve(file).map_err(|fault| placed(text, fault))?;
-        scenario.model.text = ModelText(Some(own_text(text).into()));
+        scenario.model.text = ModelText {
+            text: Some(own_text(text).into()),
+            part: Part::Whole,
+        };
         Ok(scenario)
     };
     parse().map_err(|(span, message, hint)| ModelError {

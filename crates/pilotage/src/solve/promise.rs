@@ -1,7 +1,7 @@
 //! What a plan promises, and what it earns: where its model holds, and in the world.
 
 use super::{Solution, Solved};
-use crate::belief::{BeliefMdp, Codebook};
+use crate::belief::{BeliefMdp, Codebook, Updater};
 use crate::error::Result;
 use crate::model::{HypothesisBelief, Model, WallBelief};
 use crate::progress::Progress;
@@ -75,7 +75,7 @@ impl Solution {
         {
             remarks.push("the world has walls, and the belief does not know of them: the plan expects another return than is earned; write `walls = \"clip\"` in [belief]".to_owned());
         }
-        let rule = self.by_rule(scenario, options, observer);
+        let rule = self.by_rule(scenario, options, observer)?;
         if let Some(rule) = &rule {
             let (ours, theirs) = (&world.discounted, &rule.discounted);
             if theirs.mean - ours.mean > 3.0 * theirs.stderr.hypot(ours.stderr) {
@@ -95,34 +95,35 @@ impl Solution {
 }
 
 impl Solution {
-    /// What the scenario's rule of thumb earns on beliefs that are kept as those of this solution.
+    /// What the scenario's rule of thumb earns on beliefs that are kept as those of this solution, but about all that the model says.
     fn by_rule(
         &self,
         scenario: &Scenario,
         options: Options,
         observer: &dyn Progress,
-    ) -> Option<Evaluation> {
-        let rule = scenario.rule.as_ref()?;
-        let updater = match &self.policy {
-            Solved::Automaton(automaton) => &automaton.updater,
-            Solved::Rule { updater, .. } => updater,
-            Solved::Control(_) => return None,
+    ) -> Result<Option<Evaluation>> {
+        let (Some(rule), Some(updater)) = (scenario.rule.as_ref(), self.updater()) else {
+            return Ok(None);
         };
-        let space = updater.space(&scenario.model);
+        let space = updater.whole(&scenario.model)?.space(&scenario.model);
         let told = Told::of(space.as_ref());
         let keeper = space.updater();
         let agent = || -> Box<dyn Agent + '_> { Box::new(HandAgent::new(&keeper, rule, &told)) };
-        Some(evaluate_agent(scenario, &agent, options, observer))
+        Ok(Some(evaluate_agent(scenario, &agent, options, observer)))
     }
 
     /// How many strata beliefs are read as, where they are kept in full.
     fn strata(&self) -> Option<usize> {
-        let updater = match &self.policy {
-            Solved::Automaton(automaton) => &automaton.updater,
-            Solved::Rule { updater, .. } => updater,
-            Solved::Control(_) => return None,
-        };
-        updater.codebook().map(Codebook::len)
+        self.updater()?.codebook().map(Codebook::len)
+    }
+
+    /// What keeps the belief, where it is not that of a free control.
+    fn updater(&self) -> Option<&Updater> {
+        match &self.policy {
+            Solved::Automaton(automaton) => Some(&automaton.updater),
+            Solved::Rule { updater, .. } => Some(updater),
+            Solved::Control(_) => None,
+        }
     }
 }
 

@@ -43,13 +43,20 @@ pub(super) fn changes(model: &Model) -> Option<String> {
     })
 }
 
-/// Some solvers know one motion, one sensor, and readings that always come.
-pub(super) fn steps_differ(model: &Model) -> Option<String> {
-    if let Some(phase) = model.later.first() {
-        return Some(format!(
+/// Some solvers know one motion and one sensor.
+pub(super) fn phases(model: &Model) -> Option<String> {
+    model.later.first().map(|phase| {
+        format!(
             "how it moves or is sensed changes at step {} ([[later]]), and this solver knows one motion and one sensor; use value-iteration",
             phase.from
-        ));
+        )
+    })
+}
+
+/// Some solvers know one motion, one sensor, and readings that always come.
+pub(super) fn steps_differ(model: &Model) -> Option<String> {
+    if let Some(reason) = phases(model) {
+        return Some(reason);
     }
     model.misses_readings().then(|| {
         "its readings may be missing (`present` in [sensor]), and this solver counts on each of them; use value-iteration".to_owned()

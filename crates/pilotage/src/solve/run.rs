@@ -1,8 +1,8 @@
 //! One way to run any solver: what it finds is brought into the form asked for here, and nowhere else.
 
 use super::rollout::check_runs;
-use super::solver::{Found, Learner, Plan, Planner, Problem, Request, Solver, accepted, refuse_if};
-use super::{Form, Solution, Solved, compile, refusals};
+use super::solver::{Found, Learner, Plan, Planner, Problem, Request, Solver, accepted};
+use super::{Form, Solution, Solved, compile};
 use crate::error::Result;
 use crate::model::Model;
 use crate::policy::{Automaton, AutomatonRunner};
@@ -107,13 +107,18 @@ pub fn learn(
     let model = &scenario.model;
     check_runs("runs", request.runs)?;
     let problem = Problem::new(model, request);
-    refuse_if(learner.name(), model, refusals::beyond_levels(model))?;
-    problem.mdp().check()?;
+    let levels = model.is_linear();
+    if levels {
+        problem.mdp().check()?;
+    }
     learner.accepts(model)?;
-    problem.mdp().check_bounded()?;
+    if levels {
+        problem.mdp().check_bounded()?;
+    }
     let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(scenario)) };
     let lesson = learner.learn(&problem, &worlds, request.checkpoint.as_deref(), observer)?;
     Ok(Solution {
+        levels: lesson.automaton.levels.len(),
         policy: match request.form {
             Form::Nearest | Form::Segments | Form::Tree => {
                 Solved::Automaton(annotated(lesson.automaton, &problem, request))
@@ -122,7 +127,6 @@ pub fn learn(
         },
         planned_value: None,
         policy_convergence_horizon: None,
-        levels: problem.mdp().strata(),
         samples: Some(lesson.samples),
         learning: Some(lesson.learning),
         converged: lesson.converged,
@@ -144,7 +148,8 @@ fn compiler(request: &Request) -> compile::Settings {
 /// The automaton, its nodes told where they are reached from and how often, if they do not know already.
 fn annotated(mut automaton: Automaton, problem: &Problem, request: &Request) -> Automaton {
     if automaton.nodes.iter().all(|node| node.visits == 0.0) {
-        compile::annotate(&mut automaton, problem.mdp(), request.runs, request.seed);
+        let space = automaton.space(problem.model());
+        compile::annotate(&mut automaton, space.as_ref(), request.runs, request.seed);
     }
     automaton
 }

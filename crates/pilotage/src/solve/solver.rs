@@ -115,10 +115,7 @@ impl Solver {
     pub fn accepts(&self, model: &Model) -> Result<()> {
         match self {
             Self::Planner(planner) => accepted(planner.as_ref(), model),
-            Self::Learner(learner) => {
-                refuse_if(learner.name(), model, refusals::beyond_levels(model))?;
-                learner.accepts(model)
-            }
+            Self::Learner(learner) => learner.accepts(model),
         }
     }
 

@@ -177,6 +177,7 @@ pub fn small(entry: &Entry, model: &Model) -> Solver {
         ("epoch_limit", "2"),
         ("trial", "10"),
         ("strata", "4"),
+        ("walks", "5"),
         ("readings", "3"),
         ("rounds", "1"),
         ("episodes", "5"),

@@ -10,6 +10,7 @@ use super::settings::Settings;
 use super::task::{SOLVER, Task};
 use super::world_model::WorldModel;
 use super::{Learned, Learning, Point, merge, world_model};
+use crate::belief::Memory;
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::solve::learn::{Course, Experience, Owner, critical, fitting, undiscounted};
@@ -44,7 +45,7 @@ impl Course for Task<'_> {
     fn owner(&self) -> Owner<'_, Settings> {
         Owner {
             solver: SOLVER,
-            problem: &self.mdp.model().name,
+            problem: &self.body().name,
             fingerprint: self.fingerprint,
             settings: &self.settings,
         }
@@ -111,7 +112,7 @@ impl State {
     fn fits(&self, task: &Task<'_>) -> bool {
         let actions = task.actions();
         let point = |point: &Point| point.states.iter().all(|state| state.0 < actions);
-        self.experience.fits(task.mdp.model().state_dim())
+        self.experience.fits(task.body().state_dim())
             && self.curve.iter().all(point)
             && self.tried <= task.settings.vigilances.len()
             && self.world.fits(task)
@@ -129,8 +130,9 @@ impl State {
         }
         let limit = task.settings.epoch_limit as u64;
         observer.progress("epochs", self.policy.epochs() as u64, limit);
-        let filter = task.filter.clone().recalling(self.world.recall.clone());
-        let reward = self.policy.run_epoch(task, &filter, &mut self.experience);
+        let recalling = Memory::Recall(self.world.recall.clone());
+        let updater = task.updater.clone().remembering(recalling);
+        let reward = (self.policy).run_epoch(task, &updater, &mut self.experience);
         let (samples, epochs) = (self.experience.samples, self.policy.epochs() as u64);
         self.curve.push(Point {
             vigilance: self.world.vigilance,

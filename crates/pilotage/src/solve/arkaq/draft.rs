@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::history::History;
 use super::task::{SOLVER, Task};
-use crate::belief::Recall;
+use crate::belief::{Memory, Recall};
 use crate::model::{ActionId, ModeId};
 use crate::policy::{Automaton, Matching, Node, Place};
 
@@ -30,8 +30,8 @@ impl Draft {
         let clusters = self.recall.clusters().len();
         let node =
             |node: &DraftNode| node.history.fits(clusters, actions, depth) && node.action < actions;
-        let states = task.mdp.model().state_dim();
-        self.recall.fits(states, actions, self.nodes.len()) && self.nodes.iter().all(node)
+        let axes = task.extents().len();
+        self.recall.fits(axes, actions, self.nodes.len()) && self.nodes.iter().all(node)
     }
 
     /// The same with some nodes put for others: `into` says by node which one, itself if it stays.
@@ -54,9 +54,9 @@ impl Draft {
 
     /// The automaton that a controller runs. What its filter recalls are its modes, with one node each.
     pub(super) fn compile(&self, task: &Task<'_>) -> Automaton {
-        let mut automaton = Automaton::new(&task.mdp, SOLVER, Matching::Nearest);
+        let mut automaton = Automaton::new(task.space.as_ref(), SOLVER, Matching::Nearest);
         automaton.fingerprint = task.fingerprint;
-        let model = task.mdp.model();
+        let model = task.body();
         automaton.scale = model
             .state
             .iter()
@@ -70,13 +70,14 @@ impl Draft {
             Node::new(
                 levels.clone(),
                 id,
-                Place::Point(centres[node.history.cluster].clone()),
+                Place::Point(centres[node.history.cluster][..model.state_dim()].to_vec()),
                 node.action,
                 Some(node.value),
             )
         };
         automaton.nodes = self.nodes.iter().enumerate().map(node).collect();
-        automaton.updater = task.filter.clone().recalling(self.recall.clone()).into();
+        let recalling = Memory::Recall(self.recall.clone());
+        automaton.updater = task.updater.clone().remembering(recalling);
         automaton
     }
 }

@@ -11,6 +11,8 @@
 //! The thesis' network makes clusters without end where much is continuous (3.4.6). Here [`Settings::state_limit`] ends exploration,
 //! and the result says so.
 //!
+//! Where no uncertainty levels follow motion and sensor, beliefs are kept in full, and clustered by how uncertain they are as well.
+//!
 //! Beyond the thesis, and what its chapter 7 asks for: vigilance that tunes itself ([`Settings::vigilances`]), merging of states
 //! that agree (`merge`), Watkins' Q(lambda), and a memory of more than one step ([`Settings::depth`]). [`Settings::extended`] has all
 //! four.
@@ -38,11 +40,9 @@ pub use settings::Settings;
 use crate::error::Result;
 use crate::model::{ActionId, Model};
 use crate::progress::Progress;
-use crate::scenario::Scenario;
 use crate::solve::learn::{self, Course};
 use crate::solve::solver::refuse_if;
 use crate::solve::{Learner, Lesson, Problem, refusals};
-use crate::world::{ProblemWorld, World};
 use task::{SOLVER, Task};
 
 /// What a learning run found: the automaton has a node for each state.
@@ -66,7 +66,7 @@ pub struct Learning {
 /// A cluster of the world model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClusterFound {
-    /// Its centre, length `n`, in units of the state.
+    /// Its centre, length `n`, in units of the state; where beliefs are kept in full, then the traits of strata.
     pub centre: Vec<f64>,
     /// How much of it was rewarded notably, in `[0, 1]`.
     pub rewarded: f64,
@@ -121,9 +121,7 @@ impl Learner for Settings {
 
     fn accepts(&self, model: &Model) -> Result<()> {
         refuse_if(SOLVER, model, refusals::reward_missing(model))?;
-        let worlds =
-            || -> Box<dyn World> { Box::new(ProblemWorld::new(&Scenario::assumed(model))) };
-        course(model, &worlds, self).map(drop)
+        task::check(model, self)
     }
 
     fn learn(

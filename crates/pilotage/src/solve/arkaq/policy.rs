@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::draft::{Draft, DraftNode};
 use super::task::Task;
 use super::world_model::WorldModel;
-use crate::belief::Filter;
+use crate::belief::Updater;
 use crate::model::{ActionId, Then};
 use crate::solve::learn::{Actor, Experience, Table, Transition, boltzmann};
 
@@ -62,18 +62,18 @@ impl Policy {
         self.epoch
     }
 
-    /// Acts for an epoch of whole episodes; `filter` recalls the states. Returns the reward of a step.
+    /// Acts for an epoch of whole episodes; `updater` recalls the states. Returns the reward of a step.
     pub(super) fn run_epoch(
         &mut self,
         task: &Task<'_>,
-        filter: &Filter,
+        updater: &Updater,
         experience: &mut Experience,
     ) -> f64 {
         let settings = &task.settings;
         let entries = self.best.len() * task.actions();
         let least = settings.epoch.max(settings.epoch_per_entry * entries) as u64;
         let first = experience.samples;
-        let mut actor = Actor::new(task.worlds, filter, filter.readings());
+        let mut actor = Actor::new(task.worlds, updater, updater.readings());
         let mut reward = 0.0;
         self.visits.fill(0.0);
         while experience.samples - first < least {
@@ -95,7 +95,7 @@ impl Policy {
         actor.reset(&mut draws);
         self.table.forget_traces();
         let mut reward = 0.0;
-        for _ in 0..task.mdp.model().episode.length {
+        for _ in 0..task.body().episode.length {
             let row = actor.belief().mode;
             let temperature = self.temperature * experience.reward_range();
             let values = self.table.row(row);

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::solve::learn::Rates;
+use crate::solve::learn::{Rates, Strata};
 use crate::solve::settings::{self, KEPT, MANY, PAIRED, ensure, ensure_count};
 
 /// Largest [`Settings::depth`].
@@ -33,6 +33,10 @@ pub struct Settings {
     pub explore_limit: usize,
     /// Most clusters, and most states; at least 1. Exploration that reaches it ends there, and learning goes on with those there are.
     pub state_limit: usize,
+    /// Most strata that beliefs in full are told apart by; 1 to 1000. How certain they are, and of which mode, tells clusters apart.
+    pub strata: usize,
+    /// Episodes of acting at random, in thought, among whose beliefs these strata are chosen; at least 1.
+    pub walks: usize,
     /// Watkins' lambda, in `[0, 1]`; 0 is one-step Q-learning.
     pub lambda: f64,
     /// Learning rate of values, `max(rate_floor, (1 + n)^-rate_power)` at the n-th visit; the power is in `(0.5, 1]`.
@@ -83,6 +87,8 @@ impl Default for Settings {
             settle: 2_000,
             explore_limit: 50_000,
             state_limit: 200,
+            strata: 40,
+            walks: 100,
             lambda: 0.0,
             rate_power: 0.7,
             rate_floor: 0.01,
@@ -123,6 +129,15 @@ impl Settings {
             depth: 3,
             state_limit: 1_000,
             ..Self::default()
+        }
+    }
+
+    /// How beliefs in full are read.
+    pub(super) fn strata(&self) -> Strata {
+        Strata {
+            most: self.strata,
+            walks: self.walks,
+            seed: self.seed,
         }
     }
 
@@ -218,6 +233,7 @@ impl settings::Settings for Settings {
         for (setting, value, fits, range) in reals {
             ensure(setting, value, fits, range)?;
         }
+        self.strata().validate()?;
         let counts = [
             ("vigilances", self.vigilances.len(), 1, PAIRED),
             ("scout", self.scout, 0, MANY),

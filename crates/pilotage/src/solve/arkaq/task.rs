@@ -1,22 +1,25 @@
 //! What the learner has: its own motion and sensor noise, its body's bounds, and worlds to act in.
 
 use super::settings::Settings;
-use crate::belief::{BeliefMdp, Filter};
-use crate::error::{Error, Result};
-use crate::model::{Fingerprint, Model};
+use crate::belief::{BeliefSpace, Updater};
+use crate::error::Result;
+use crate::model::{Fingerprint, Interval, Model};
 use crate::policy::Automaton;
+use crate::scenario::Scenario;
 use crate::solve::Settings as _;
-use crate::solve::learn::{Trial, Worlds, known, run_trial};
+use crate::solve::learn::{Trial, Worlds, beliefs, run_trial, unbounded};
+use crate::solve::solver::refuse_if;
+use crate::world::{ProblemWorld, World};
 
 /// Name of the solver in errors and policies.
 pub(super) const SOLVER: &str = "arkaq";
 
 /// The learner's task.
 pub(super) struct Task<'a> {
-    /// What the agent assumes, without map, rewards, events and modes.
-    pub(super) mdp: BeliefMdp,
-    /// The filter before there are clusters.
-    pub(super) filter: Filter,
+    /// What the agent believes by what it knows of itself.
+    pub(super) space: Box<dyn BeliefSpace>,
+    /// What keeps that before there are clusters.
+    pub(super) updater: Updater,
     pub(super) settings: Settings,
     pub(super) worlds: &'a Worlds<'a>,
     /// Fingerprint of the whole problem.
@@ -24,45 +27,66 @@ pub(super) struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    /// The task of a model, of which only A, B, H, Q, R, the bounds, the start belief, the discount and the length of an episode are
-    /// looked at.
+    /// The task of a model, of which only its body, the discount and the length of an episode are looked at.
     pub(super) fn new(model: &Model, settings: Settings, worlds: &'a Worlds<'a>) -> Result<Self> {
         settings.validate()?;
-        if let Some(variable) = model.state.iter().find(|v| !v.bounds.width().is_finite()) {
-            return Err(Error::Unsupported {
-                solver: SOLVER,
-                model: model.name.clone(),
-                reason: format!(
-                    "it measures beliefs by the world's outer bounds, and {} has none; add `state.bounds`",
-                    variable.name
-                ),
-            });
+        check_bounds(model)?;
+        let space = beliefs(&model.body(), settings.strata())?;
+        if let Some(mdp) = space.as_mdp() {
+            mdp.check_bounded()?;
         }
-        let mdp = BeliefMdp::new(&known(model));
-        mdp.check()?;
-        mdp.check_bounded()?;
         Ok(Self {
-            filter: mdp.filter(),
-            mdp,
+            updater: space.updater(),
+            space,
             settings,
             worlds,
             fingerprint: model.fingerprint(),
         })
     }
 
+    /// What the agent knows of itself.
+    pub(super) fn body(&self) -> &Model {
+        self.space.model()
+    }
+
+    /// What places among clusters lie between.
+    pub(super) fn extents(&self) -> Vec<Interval> {
+        self.updater.extents(self.body())
+    }
+
     /// Number of actions.
     pub(super) fn actions(&self) -> usize {
-        self.mdp.model().actions.len()
+        self.body().actions.len()
     }
 
     /// Discount factor.
     pub(super) fn discount(&self) -> f64 {
-        self.mdp.model().discount
+        self.body().discount
     }
 
     /// Runs an automaton, the same episodes at every trial.
     pub(super) fn trial(&self, automaton: &Automaton) -> Trial {
         let Settings { trial, seed, .. } = self.settings;
-        run_trial(self.mdp.model(), self.worlds, automaton, trial, seed)
+        run_trial(self.body(), self.worlds, automaton, trial, seed)
     }
+}
+
+/// Whether a model can be learned, as far as that is known before its beliefs are.
+///
+/// # Errors
+/// [`crate::Error::Unsupported`] with the reason, and what [`Task::new`] says where a filter keeps its beliefs.
+pub(super) fn check(model: &Model, settings: &Settings) -> Result<()> {
+    settings.validate()?;
+    if !model.body().is_linear() {
+        return check_bounds(model);
+    }
+    let worlds = || -> Box<dyn World> { Box::new(ProblemWorld::new(&Scenario::assumed(model))) };
+    Task::new(model, settings.clone(), &worlds).map(drop)
+}
+
+fn check_bounds(model: &Model) -> Result<()> {
+    let reason = unbounded(model).map(|variable| {
+        format!("it measures beliefs by the world's outer bounds, and {variable} has none; add `state.bounds`")
+    });
+    refuse_if(SOLVER, model, reason)
 }

@@ -37,8 +37,7 @@ impl WorldModel {
         let clusters = self.recall.clusters().len();
         let state = |state: &History| state.fits(clusters, actions, depth);
         let states = self.states.len();
-        self.recall
-            .fits(task.mdp.model().state_dim(), actions, states)
+        self.recall.fits(task.extents().len(), actions, states)
             && self.states.iter().all(state)
             && self.rewarded.len() == clusters
             && self.founded.len() == clusters
@@ -80,7 +79,7 @@ pub(super) fn generate(
 ) -> Result<WorldModel> {
     let settings = &task.settings;
     explore(task, experience, settings.scout, |_, _| Ok(true))?;
-    let coding = Coding::new(task.mdp.model());
+    let coding = Coding::new(task.extents());
     let mut network = Segmentation::new(task, &coding, vigilance)?;
     explore(
         task,
@@ -92,7 +91,7 @@ pub(super) fn generate(
     let mut memory = Memory::new(task, clusters.len());
     if !network.patience.capped {
         explore(task, experience, settings.explore_limit, |seen, _| {
-            Ok(memory.take(clusters.nearest(seen.mean), seen.action))
+            Ok(memory.take(clusters.nearest(seen.place), seen.action))
         })?;
     }
     let (states, recall) = memory.histories.into_automaton(clusters, task.actions());
@@ -109,7 +108,8 @@ pub(super) fn generate(
 
 /// A belief that was come to.
 struct Seen<'a> {
-    mean: &'a [f64],
+    /// Where it is among clusters.
+    place: &'a [f64],
     /// What led to it; `None` where an episode starts.
     action: Option<ActionId>,
     reward: f64,
@@ -123,18 +123,18 @@ fn explore(
     mut take: impl FnMut(Seen<'_>, &Experience) -> Result<bool>,
 ) -> Result<()> {
     let end = experience.samples + steps as u64;
-    let mut actor = Actor::new(task.worlds, &task.filter, task.filter.readings());
+    let mut actor = Actor::new(task.worlds, &task.updater, task.updater.readings());
     let mut more = true;
     while more && experience.samples < end {
         let (mut draws, mut exploration) = experience.next_episode(task.settings.seed);
         actor.reset(&mut draws);
         let mut seen = (None, 0.0);
-        for _ in 0..task.mdp.model().episode.length {
+        for _ in 0..task.body().episode.length {
             let (action, reward) = seen;
-            let mean = &actor.belief().mean;
+            let place = task.updater.place(actor.belief());
             more = take(
                 Seen {
-                    mean,
+                    place: &place,
                     action,
                     reward,
                 },
@@ -193,14 +193,14 @@ impl Patience {
 /// ART2BeliefSimplexUpdate.
 struct Segmentation<'a> {
     art: Art,
-    coding: &'a Coding<'a>,
+    coding: &'a Coding,
     notable: f64,
     founded: Vec<u64>,
     patience: Patience,
 }
 
 impl<'a> Segmentation<'a> {
-    fn new(task: &Task<'_>, coding: &'a Coding<'a>, vigilance: f64) -> Result<Self> {
+    fn new(task: &Task<'_>, coding: &'a Coding, vigilance: f64) -> Result<Self> {
         let settings = &task.settings;
         let network = Network {
             vigilance,
@@ -219,7 +219,7 @@ impl<'a> Segmentation<'a> {
 
     fn take(&mut self, seen: &Seen<'_>, experience: &Experience) -> Result<bool> {
         let event = experience.is_notable(seen.reward, self.notable);
-        let shown = self.art.present(&self.coding.input(seen.mean, event))?;
+        let shown = self.art.present(&self.coding.input(seen.place, event))?;
         if shown.outcome == Outcome::Committed {
             self.founded.push(experience.samples);
         }

@@ -10,7 +10,7 @@ use crate::solve::codebook::GridValues;
 use crate::world::{Observation, ProblemWorld, Streams, World};
 
 /// A belief that was met.
-pub(super) struct Met<F> {
+pub(in crate::solve) struct Met<F> {
     pub full: F,
     pub moments: Moments,
 }
@@ -26,7 +26,7 @@ const MOST: usize = 100;
 
 /// Runs so many episodes and returns the beliefs met at their decisions: those of a policy that slips now and then, or of walks that take
 /// an action for a while and then another. The same for any number of threads.
-pub(super) fn meet<K: Keeping>(
+pub(in crate::solve) fn meet<K: Keeping>(
     model: &Model,
     keeping: &K,
     policy: Option<&GridValues>,

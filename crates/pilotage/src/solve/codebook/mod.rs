@@ -34,7 +34,8 @@ use crate::progress::Progress;
 use crate::scenario::Scenario;
 use crate::simulate::{Options, evaluate};
 pub use grid_values::GridValues;
-use meet::{Met, meet};
+use meet::Met;
+pub(super) use meet::meet;
 use rows::Rows;
 
 /// Name of the solver in errors and policies.

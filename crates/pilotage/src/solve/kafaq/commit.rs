@@ -41,7 +41,7 @@ pub(super) fn segment_less_certain_levels(
         })
         .collect();
     let mut own = Vec::new();
-    for level in (0..task.chain.len() - 1).rev() {
+    for level in (0..task.later()).rev() {
         let evidence = explore_level(task, experience, draft, level, &values);
         for memory in 0..memories {
             let (evidence, regions) = (&evidence[memory], &mut regions[memory]);

@@ -30,7 +30,7 @@ impl Course for Task<'_> {
     fn owner(&self) -> Owner<'_, Settings> {
         Owner {
             solver: SOLVER,
-            problem: &self.mdp.model().name,
+            problem: &self.body().name,
             fingerprint: self.fingerprint,
             settings: &self.settings,
         }

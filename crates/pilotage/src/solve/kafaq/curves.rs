@@ -37,8 +37,7 @@ fn of_regions(automaton: &Automaton, learning: &Learning) -> Vec<Line> {
     let line = |region: &RegionValue| {
         let middle = middle(region);
         let points = epochs(learning, learning.adopted).map(|point| {
-            let value =
-                holder(point, region.memory, &middle).map_or(f64::NAN, |region| region.value);
+            let value = holder(point, region, &middle).map_or(f64::NAN, |region| region.value);
             (point.samples as f64, value)
         });
         Line {
@@ -64,10 +63,10 @@ fn volume(region: &RegionValue) -> f64 {
     sides.map(|(low, high)| high - low).product()
 }
 
-/// The smallest region of a memory that holds a place.
-fn holder<'a>(point: &'a Point, memory: usize, place: &[f64]) -> Option<&'a RegionValue> {
+/// The smallest region that holds a place, of the memory and stratum of another.
+fn holder<'a>(point: &'a Point, other: &RegionValue, place: &[f64]) -> Option<&'a RegionValue> {
     let holds = |region: &&RegionValue| {
-        region.memory == memory
+        (region.memory, region.stratum) == (other.memory, other.stratum)
             && (0..place.len()).all(|i| region.lower[i] <= place[i] && place[i] <= region.upper[i])
     };
     let holders = point.regions.iter().filter(holds);
@@ -78,7 +77,14 @@ fn name(automaton: &Automaton, region: &RegionValue, middle: &[f64]) -> String {
     let place: Vec<String> = middle.iter().map(|x| format!("{x:.1}")).collect();
     let action = automaton.actions.get(region.action);
     let action = action.map_or("?", String::as_str);
-    let place = format!("{action} at {}", place.join(", "));
+    let place = match automaton.updater.codebook() {
+        None => format!("{action} at {}", place.join(", ")),
+        Some(_) => format!(
+            "{action} at {}, stratum {}",
+            place.join(", "),
+            region.stratum
+        ),
+    };
     match automaton.modes.get(region.memory).map(String::as_str) {
         None | Some("") => place,
         Some(memory) => format!("{place}, {memory}"),

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::lattice::CellBox;
 use super::memory::{Kind, Memory};
 use super::task::{SOLVER, Task};
-use crate::belief::{Belief, Filter};
+use crate::belief::{Belief, Filter, Memory as Remembers, Updater};
 use crate::model::{ActionId, Region as Place, Steps, Switch, When};
 use crate::policy::{Automaton, Matching, Node, Place as Segment};
 
@@ -70,7 +70,7 @@ impl Draft {
 
     /// The automaton that a controller runs.
     pub(super) fn compile(&self, task: &Task<'_>) -> Automaton {
-        let mut automaton = Automaton::new(&task.mdp, SOLVER, Matching::Segments);
+        let mut automaton = Automaton::new(task.space.as_ref(), SOLVER, Matching::Segments);
         automaton.fingerprint = task.fingerprint;
         if let Some(coordinates) = &task.coordinates {
             automaton.scale = vec![1.0; coordinates.count()];
@@ -84,18 +84,24 @@ impl Draft {
             .iter()
             .map(|node| self.compile_node(task, node))
             .collect();
+        automaton.updater = self.updater(task);
+        automaton
+    }
+
+    /// What keeps the belief, with memories for modes.
+    fn updater(&self, task: &Task<'_>) -> Updater {
+        let switches = self.switches(task);
+        let Some(mdp) = task.space.as_mdp() else {
+            return task
+                .updater
+                .clone()
+                .remembering(Remembers::Switches(switches));
+        };
         let start = Belief {
             mode: self.alias[0],
-            ..task.mdp.start().clone()
+            ..mdp.start().clone()
         };
-        automaton.updater = Filter::with_switches(
-            task.mdp.model(),
-            task.mdp.levels(),
-            &start,
-            self.switches(task),
-        )
-        .into();
-        automaton
+        Filter::with_switches(mdp.model(), mdp.levels(), &start, switches).into()
     }
 
     /// A node also stands for the less certain levels that have no regions of their own.

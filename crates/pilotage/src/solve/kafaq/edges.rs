@@ -35,16 +35,16 @@ pub(super) fn compile(task: &Task<'_>, steady: &Steady) -> (Draft, Trial, u64) {
 }
 
 fn nodes(task: &Task<'_>, steady: &Steady) -> Vec<DraftNode> {
-    let by_memory = steady.regions.iter().enumerate();
-    let node = |memory, region: &super::regions::Region| DraftNode {
-        level: task.chain.len() - 1,
-        memory,
+    let by_sheet = steady.regions.iter().enumerate();
+    let node = |sheet: usize, region: &super::regions::Region| DraftNode {
+        level: task.later() + sheet % task.sheets,
+        memory: sheet / task.sheets,
         cells: region.cells.clone(),
         action: region.action,
-        value: steady.region_value(task, memory, region),
+        value: steady.region_value(task, sheet, region),
     };
-    by_memory
-        .flat_map(|(memory, regions)| regions.iter().map(move |region| node(memory, region)))
+    by_sheet
+        .flat_map(|(sheet, regions)| regions.iter().map(move |region| node(sheet, region)))
         .collect()
 }
 

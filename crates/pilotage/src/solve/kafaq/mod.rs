@@ -9,6 +9,9 @@
 //! collected by neighbourhood and action, and a test with a stated error rate says whether another action is better there
 //! ([`Settings::split_error`]). The printed rules are kept as [`Rules::Printed`].
 //!
+//! Where no uncertainty levels follow motion and sensor, beliefs are kept in full and read as strata, in no order that all of them follow: then
+//! all strata are learned at once, without memory, and the automaton carries the strata.
+//!
 //! Neighbourhoods are the cells of a lattice along the state variables, or along the modes of a motion that mixes them (`axes`).
 //!
 //! 1. *The steady level* (`steady`): Q-learning with Boltzmann exploration; every epoch, best actions, splits, extensions and
@@ -46,14 +49,13 @@ use crate::solve::Worlds;
 pub use curves::drawn;
 pub use settings::{Rules, Settings};
 
+use crate::belief::StratumId;
 use crate::error::Result;
 use crate::model::{ActionId, Model};
 use crate::progress::Progress;
-use crate::scenario::Scenario;
 use crate::solve::learn::{self, Course};
 use crate::solve::solver::refuse_if;
 use crate::solve::{Learner, Lesson, Problem, refusals};
-use crate::world::{ProblemWorld, World};
 use task::{SOLVER, Task};
 
 /// What a learning run found.
@@ -88,6 +90,8 @@ pub struct Point {
 pub struct RegionValue {
     /// Memory it belongs to.
     pub memory: usize,
+    /// Stratum of the beliefs it is for: the steady level, or any where beliefs are kept in full.
+    pub stratum: StratumId,
     /// Lower corner, in the coordinates of the automaton.
     pub lower: Vec<f64>,
     /// Upper corner.
@@ -139,11 +143,12 @@ impl Learner for Settings {
     }
 
     fn accepts(&self, model: &Model) -> Result<()> {
-        let reason = refusals::reward_missing(model).or_else(|| refusals::steps_differ(model));
+        let reason = refusals::reward_missing(model).or_else(|| match model.body().is_linear() {
+            true => refusals::steps_differ(model),
+            false => refusals::phases(model),
+        });
         refuse_if(SOLVER, model, reason)?;
-        let worlds =
-            || -> Box<dyn World> { Box::new(ProblemWorld::new(&Scenario::assumed(model))) };
-        course(model, &worlds, self).map(drop)
+        task::check(model, self)
     }
 
     fn learn(

@@ -111,7 +111,7 @@ impl State {
     /// Whether it is one that a task can have.
     pub(super) fn fits(&self, task: &Task<'_>) -> bool {
         let settings = &task.settings;
-        let (states, actions) = (task.mdp.model().state_dim(), task.actions());
+        let (states, actions) = (task.body().state_dim(), task.actions());
         let point = |point: &Point| {
             point.memory == 0 && point.regions.iter().all(|r| r.fits(states, actions))
         };
@@ -149,7 +149,7 @@ impl State {
         let (mut draws, mut exploration) = self.experience.next_episode(settings.seed);
         actor.reset(&mut draws);
         let mut previous: Option<(usize, ActionId, f64)> = None;
-        for _ in 0..task.mdp.model().episode.length {
+        for _ in 0..task.body().episode.length {
             if self.is_over(task) {
                 break;
             }
@@ -191,7 +191,7 @@ impl State {
                 self.temperature = (self.temperature * settings.cooling).max(settings.cold);
                 let reward = self.reward / settings.epoch as f64;
                 self.curve
-                    .push(point(regions, self.experience.samples, reward));
+                    .push(point(task, regions, self.experience.samples, reward));
                 self.reward = 0.0;
                 observer.progress("steps", self.experience.samples, step_limit);
             }
@@ -218,8 +218,8 @@ impl State {
 
 /// The initial belief range, inside the world.
 fn first_region(task: &Task<'_>) -> Region {
-    let (start, model) = (task.mdp.start(), task.mdp.model());
-    let covariance = task.mdp.covariance(start.stratum);
+    let (start, model) = (task.space.start(), task.body());
+    let covariance = task.space.covariance(start.stratum);
     let half: Vec<f64> = (0..start.mean.len())
         .map(|i| START_WIDTH * covariance[(i, i)].sqrt())
         .collect();
@@ -261,11 +261,12 @@ fn corners(region: &Region) -> (Vec<f64>, Vec<f64>) {
     }
 }
 
-fn point(regions: &[Region], samples: u64, reward: f64) -> Point {
+fn point(task: &Task<'_>, regions: &[Region], samples: u64, reward: f64) -> Point {
     let value = |region: &Region| {
         let (lower, upper) = corners(region);
         RegionValue {
             memory: 0,
+            stratum: task.steady(),
             lower,
             upper,
             action: region.best(),
@@ -281,7 +282,7 @@ fn point(regions: &[Region], samples: u64, reward: f64) -> Point {
 }
 
 fn compile(task: &Task<'_>, regions: &[Region]) -> Automaton {
-    let mut automaton = Automaton::new(&task.mdp, SOLVER, Matching::Segments);
+    let mut automaton = Automaton::new(task.space.as_ref(), SOLVER, Matching::Segments);
     automaton.fingerprint = task.fingerprint;
     let levels = task.chain[0]..=task.steady();
     let node = |region: &Region| {

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::solve::learn::Rates;
+use crate::solve::learn::{Rates, Strata};
 use crate::solve::settings::{self, KEPT, MANY, PAIRED, ensure, ensure_count};
 
 /// How regions change.
@@ -34,6 +34,10 @@ pub struct Settings {
     pub cells_along: usize,
     /// Most neighbourhoods; at least 1.
     pub cell_limit: usize,
+    /// Most strata that beliefs in full are told apart by; 1 to 1000. They share the neighbourhoods that there may be.
+    pub strata: usize,
+    /// Episodes of acting at random, in thought, among whose beliefs these strata are chosen; at least 1.
+    pub walks: usize,
     /// Watkins' lambda, in `[0, 1]`; 0 is one-step Q-learning.
     pub lambda: f64,
     /// Learning rate `max(rate_floor, (1 + n)^-rate_power)` at the n-th visit; the power is in `(0.5, 1]`.
@@ -96,6 +100,8 @@ impl Default for Settings {
             cell_stride: 0.35,
             cells_along: 64,
             cell_limit: 4_000,
+            strata: 12,
+            walks: 100,
             lambda: 0.0,
             rate_power: 0.7,
             rate_floor: 0.01,
@@ -126,6 +132,22 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// How beliefs in full are read.
+    pub(super) fn strata(&self) -> Strata {
+        Strata {
+            most: self.strata,
+            walks: self.walks,
+            seed: self.seed,
+        }
+    }
+
+    /// Most neighbourhoods along each of so many axes, where so many strata share all that there may be.
+    pub(super) fn cells_along_in_full(&self, strata: usize, axes: usize) -> usize {
+        let share = self.cell_limit as f64 / strata as f64;
+        let along = share.powf(1.0 / axes as f64) as usize;
+        along.clamp(1, self.cells_along)
+    }
+
     /// How fast values are learned.
     pub(super) fn rates(&self) -> Rates {
         Rates {
@@ -267,6 +289,7 @@ impl settings::Settings for Settings {
                 "more than 0 and less than 1",
             )?;
         }
+        self.strata().validate()?;
         let counts = [
             ("cell_limit", self.cell_limit, 1, KEPT),
             ("cells_along", self.cells_along, 1, KEPT),

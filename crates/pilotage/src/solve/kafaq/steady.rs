@@ -1,12 +1,17 @@
 //! SegmentSteadyLevel (Figure 4.5): regions of the most certain level, for one memory, learned by acting.
+//!
+//! Where beliefs are kept in full there is no level that the others lead to. Then all strata are learned at once, each with regions of its
+//! own. What is kept of a stratum and a memory is a *sheet*. As beliefs in full go wherever actions lead them, every other episode follows the
+//! regions themselves, so that there is evidence where the automaton would come to.
 
 use serde::{Deserialize, Serialize};
 
 use super::evidence::Halves;
 use super::memory::{Kind, Memory};
-use super::regions::{Region, Reviser};
+use super::regions::{Region, Reviser, actions_by_cell};
 use super::task::Task;
-use crate::model::Then;
+use crate::belief::Belief;
+use crate::model::{ActionId, Then};
 use crate::random::uniform;
 use crate::solve::learn::{Actor, Experience, Table, Transition, boltzmann};
 
@@ -18,9 +23,9 @@ const EVENTS: usize = 20_000;
 pub(super) struct Steady {
     pub memory: Memory,
     pub table: Table,
-    /// By memory.
+    /// By memory and stratum.
     pub evidence: Vec<Halves>,
-    /// By memory.
+    /// By memory and stratum.
     pub regions: Vec<Vec<Region>>,
     pub crossings: Crossings,
     epoch: usize,
@@ -114,17 +119,18 @@ pub(super) struct Earned {
 }
 
 impl Steady {
-    /// Nothing learned yet: one region for every memory, the whole world.
+    /// Nothing learned yet: one region for every sheet, the whole world.
     pub(super) fn new(task: &Task<'_>, memory: Memory) -> Self {
         let (memories, cells, actions) = (memory.len(), task.lattice.len(), task.actions());
+        let sheets = memories * task.sheets;
         let whole = Region {
             cells: task.lattice.whole(),
             action: 0,
         };
         Self {
-            table: Table::new(memories * cells, actions),
-            evidence: vec![Halves::new(cells, actions); memories],
-            regions: vec![vec![whole]; memories],
+            table: Table::new(sheets * cells, actions),
+            evidence: vec![Halves::new(cells, actions); sheets],
+            regions: vec![vec![whole]; sheets],
             crossings: Crossings::new(memories, actions, cells),
             epoch: 0,
             calm: 0,
@@ -136,21 +142,22 @@ impl Steady {
     /// Whether it is what can have been learned of a task.
     pub(super) fn fits(&self, task: &Task<'_>) -> bool {
         let (settings, cells, actions) = (&task.settings, task.lattice.len(), task.actions());
-        if !self.memory.fits(task.mdp.model().state_dim(), actions) {
+        if !self.memory.fits(task.body().state_dim(), actions) {
             return false;
         }
         let memories = self.memory.len();
+        let sheets = memories * task.sheets;
         let regions = |regions: &Vec<Region>| {
             let fits = |region: &Region| region.fits(&task.lattice, actions);
             !regions.is_empty() && regions.iter().all(fits)
         };
-        self.table.fits(memories * cells, actions)
-            && self.evidence.len() == memories
+        self.table.fits(sheets * cells, actions)
+            && self.evidence.len() == sheets
             && self
                 .evidence
                 .iter()
                 .all(|evidence| evidence.fits(cells, actions))
-            && self.regions.len() == memories
+            && self.regions.len() == sheets
             && self.regions.iter().all(regions)
             && self.crossings.fits(memories, actions, cells)
             && self.epoch <= settings.epoch_limit
@@ -173,23 +180,33 @@ impl Steady {
         self.epoch
     }
 
-    /// The row of the table that a memory and cell have.
-    pub(super) fn row(&self, task: &Task<'_>, memory: usize, cell: usize) -> usize {
-        memory * task.lattice.len() + cell
+    /// The row of the table that a sheet and cell have.
+    pub(super) fn row(&self, task: &Task<'_>, sheet: usize, cell: usize) -> usize {
+        sheet * task.lattice.len() + cell
+    }
+
+    /// The sheet of a memory and a belief, and whether it is learned there: less certain levels act as the first one.
+    fn sheet(&self, task: &Task<'_>, memory: usize, belief: &Belief) -> (usize, bool) {
+        let learned = task.sheet(belief.stratum);
+        let sheet = memory * task.sheets + learned.unwrap_or(0);
+        (sheet, learned.is_some())
     }
 
     /// Acts for an epoch of whole episodes, then revises the regions.
     pub(super) fn run_epoch(&mut self, task: &Task<'_>, experience: &mut Experience) -> Earned {
         let settings = &task.settings;
-        let entries = self.memory.len() * task.lattice.len() * task.actions();
+        let entries = self.regions.len() * task.lattice.len() * task.actions();
         let least = settings.epoch.max(settings.epoch_per_cell * entries) as u64;
         let mut earned = Earned {
             steps: 0,
             reward: 0.0,
         };
         let mut actor = task.actor();
+        let ruling = self.ruling(task);
         while earned.steps < least {
-            self.run_episode(task, &mut actor, experience, &mut earned);
+            let followed = ruling.as_deref();
+            let followed = followed.filter(|_| experience.episodes.is_multiple_of(2));
+            self.run_episode(task, &mut actor, followed, experience, &mut earned);
         }
         self.epoch += 1;
         let worth = settings.worth * (1.0 - task.discount()) * self.mean_value(task);
@@ -202,10 +219,18 @@ impl Steady {
         earned
     }
 
+    /// By sheet and cell: the action of its region, where regions are followed.
+    fn ruling(&self, task: &Task<'_>) -> Option<Vec<Vec<ActionId>>> {
+        let of = |regions: &Vec<Region>| actions_by_cell(&task.lattice, regions);
+        let followed = task.space.as_mdp().is_none();
+        followed.then(|| self.regions.iter().map(of).collect())
+    }
+
     fn run_episode(
         &mut self,
         task: &Task<'_>,
         actor: &mut Actor<'_>,
+        followed: Option<&[Vec<ActionId>]>,
         experience: &mut Experience,
         earned: &mut Earned,
     ) {
@@ -213,13 +238,16 @@ impl Steady {
         actor.reset(&mut draws);
         self.table.forget_traces();
         let mut memory = 0;
-        for _ in 0..task.mdp.model().episode.length {
+        for _ in 0..task.body().episode.length {
             let cell = task.cell(&actor.belief().mean);
-            let row = self.row(task, memory, cell);
+            let (sheet, learned) = self.sheet(task, memory, actor.belief());
+            let row = self.row(task, sheet, cell);
             let temperature = self.temperature * experience.reward_range();
             let explore = task.settings.explore;
-            let action = boltzmann(self.table.row(row), temperature, explore, &mut exploration);
-            let at_steady = actor.belief().stratum == task.steady();
+            let action = match followed {
+                Some(ruling) if uniform(&mut exploration) >= explore => ruling[sheet][cell],
+                _ => boltzmann(self.table.row(row), temperature, explore, &mut exploration),
+            };
             let step = actor.step(action, &mut draws);
             experience.collect(step.reward);
             earned.steps += 1;
@@ -232,8 +260,9 @@ impl Steady {
                     .next(memory, action, step.reward, &actor.belief().mean),
             };
             let next_cell = task.cell(&actor.belief().mean);
-            if at_steady {
-                let next = self.row(task, next_memory, next_cell);
+            if learned {
+                let (next_sheet, _) = self.sheet(task, next_memory, actor.belief());
+                let next = self.row(task, next_sheet, next_cell);
                 let transition = Transition {
                     row,
                     action,
@@ -244,7 +273,7 @@ impl Steady {
                     self.table
                         .td_update(task.settings.rates(), task.discount(), transition);
                 let coin = uniform(&mut exploration) < 0.5;
-                self.evidence[memory].add(coin, cell, action, target);
+                self.evidence[sheet].add(coin, cell, action, target);
                 self.crossings.arrive(memory, action, next_cell);
                 if self.memory.is_event(step.reward) {
                     self.crossings.event(memory, action, next_memory, next_cell);
@@ -265,7 +294,7 @@ impl Steady {
         }
     }
 
-    /// Lets old evidence fade, counts calm epochs and cools down. Evidence is enough once it has filled a window in every memory that
+    /// Lets old evidence fade, counts calm epochs and cools down. Evidence is enough once it has filled a window in every sheet that
     /// is in use.
     fn settle(&mut self, task: &Task<'_>, changed: f64) {
         let settings = &task.settings;
@@ -297,10 +326,10 @@ impl Steady {
     /// Mean size of the best value over all visits, against which worth is measured.
     pub(super) fn mean_value(&self, task: &Task<'_>) -> f64 {
         let (mut sum, mut visits) = (0.0, 0.0);
-        for (memory, evidence) in self.evidence.iter().enumerate() {
+        for (sheet, evidence) in self.evidence.iter().enumerate() {
             for cell in 0..task.lattice.len() {
                 let weight = evidence.all.visits(cell);
-                sum += weight * self.table.best(self.row(task, memory, cell)).abs();
+                sum += weight * self.table.best(self.row(task, sheet, cell)).abs();
                 visits += weight;
             }
         }
@@ -308,11 +337,11 @@ impl Steady {
     }
 
     /// Mean value of a region's action over its visits.
-    pub(super) fn region_value(&self, task: &Task<'_>, memory: usize, region: &Region) -> f64 {
+    pub(super) fn region_value(&self, task: &Task<'_>, sheet: usize, region: &Region) -> f64 {
         let (mut sum, mut visits) = (0.0, 1e-9);
         for cell in task.lattice.cells(&region.cells) {
-            let weight = self.evidence[memory].all.visits(cell);
-            sum += weight * self.table.row(self.row(task, memory, cell))[region.action];
+            let weight = self.evidence[sheet].all.visits(cell);
+            sum += weight * self.table.row(self.row(task, sheet, cell))[region.action];
             visits += weight;
         }
         sum / visits

@@ -53,7 +53,7 @@ impl State {
         let point = |point: &Point| {
             point.memory <= self.tried && point.regions.iter().all(|r| r.fits(axes, actions))
         };
-        self.experience.fits(task.mdp.model().state_dim())
+        self.experience.fits(task.body().state_dim())
             && self.tried <= most_tried
             && self.curve.iter().all(point)
             && self.learning.iter().all(|steady| steady.fits(task))
@@ -139,8 +139,8 @@ impl State {
     /// believes do not move it, for any other shows in its belief.
     fn next_memory(&self, task: &Task<'_>) -> Option<Steady> {
         let experience = &self.experience;
-        // Edges are boxes of state variables.
-        if task.coordinates.is_some() {
+        // Edges are boxes of state variables, and lead between regions of one stratum.
+        if task.coordinates.is_some() || task.space.as_mdp().is_none() {
             return None;
         }
         let threshold = task.settings.notable * experience.rewards.1;
@@ -154,7 +154,7 @@ impl State {
         if places.len() < 2 {
             return None;
         }
-        let model = task.mdp.model();
+        let model = task.body();
         let still =
             (0..task.actions()).filter(|&action| model.displacement(action, 0).amax() == 0.0);
         let mut kinds = std::iter::once(Kind::Place).chain(still.map(Kind::PlaceAndParity));
@@ -179,16 +179,17 @@ impl State {
     }
 
     fn point(&self, task: &Task<'_>, steady: &Steady, reward: f64) -> Point {
-        let by_memory = steady.regions.iter().enumerate();
-        let regions = by_memory.flat_map(|(memory, regions)| {
+        let by_sheet = steady.regions.iter().enumerate();
+        let regions = by_sheet.flat_map(|(sheet, regions)| {
             regions.iter().map(move |region| {
                 let (lower, upper) = task.lattice.corners(&region.cells);
                 RegionValue {
-                    memory,
+                    memory: sheet / task.sheets,
+                    stratum: task.chain[task.later() + sheet % task.sheets],
                     lower,
                     upper,
                     action: region.action,
-                    value: steady.region_value(task, memory, region),
+                    value: steady.region_value(task, sheet, region),
                 }
             })
         });
@@ -223,6 +224,6 @@ impl State {
 }
 
 fn action_names(task: &Task<'_>) -> Vec<String> {
-    let actions = task.mdp.model().actions.iter();
+    let actions = task.body().actions.iter();
     actions.map(|action| action.name.clone()).collect()
 }

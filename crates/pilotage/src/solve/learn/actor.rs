@@ -1,7 +1,7 @@
-//! An agent that acts: a world, the belief about it, and the part of a model that it is told.
+//! An agent that acts: a world and the belief about it.
 
 use crate::belief::{Belief, Tracker, Tracking};
-use crate::model::{ActionId, Model, Then};
+use crate::model::{ActionId, Then};
 use crate::solve::learn::Worlds;
 use crate::world::{Observation, Step, Streams, World};
 
@@ -42,20 +42,5 @@ impl<'a> Actor<'a> {
             Then::End => {}
         }
         step
-    }
-}
-
-/// The part of a model that a learner is told.
-pub(crate) fn known(model: &Model) -> Model {
-    let mut start = model.start.clone();
-    start.iter_mut().for_each(|hypothesis| hypothesis.mode = 0);
-    Model {
-        modes: vec![String::new()],
-        start,
-        rewards: Vec::new(),
-        events: Vec::new(),
-        cost: None,
-        map: None,
-        ..model.clone()
     }
 }

@@ -2,13 +2,15 @@
 //! automata, and the loop that runs a learner, with its checkpoints.
 
 mod actor;
+mod body;
 mod checkpoint;
 mod experience;
 mod run;
 mod table;
 mod trial;
 
-pub(super) use actor::{Actor, known};
+pub(super) use actor::Actor;
+pub(super) use body::{Strata, beliefs, unbounded};
 pub use checkpoint::Owner;
 pub(super) use experience::Experience;
 pub(super) use run::fitting;
