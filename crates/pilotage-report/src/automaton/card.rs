@@ -46,6 +46,21 @@ impl Card {
         }
     }
 
+    /// A card with its action, what is written on its strip, its share of all steps and the rows below.
+    pub fn new(action: usize, name: String, visits: Option<f64>, rows: Vec<String>) -> Self {
+        let mut tooltip = [vec![name.clone()], rows.clone()].concat().join(", ");
+        if let Some(visits) = visits {
+            tooltip += &format!(", {} of all steps", percent(visits));
+        }
+        Self {
+            action,
+            name,
+            visits,
+            rows,
+            tooltip,
+        }
+    }
+
     /// Width and height.
     pub fn size(&self) -> (f64, f64) {
         let strip = text_width(&self.name, NAME) * 1.1

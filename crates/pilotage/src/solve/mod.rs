@@ -67,5 +67,5 @@ pub use registry::{Entry, Registry};
 pub use run::{learn, plan, solve};
 pub use settings::{SettingInfo, Settings};
 pub use solution::{Form, Learning, Line, Solution, Solved};
-pub use solver::{Found, Learner, Lesson, Plan, Planner, Problem, Request, Solver, Worlds};
+pub use solver::{Found, Learner, Lesson, Plan, Planner, Problem, Request, Size, Solver, Worlds};
 pub use value_iteration::ValueIteration;

@@ -1,7 +1,7 @@
 //! What a plan promises, and what it earns: where its model holds, and in the world.
 
 use super::{Solution, Solved};
-use crate::belief::{BeliefMdp, Codebook};
+use crate::belief::{BeliefMdp, Codebook, Updater};
 use crate::error::Result;
 use crate::model::{HypothesisBelief, Model, WallBelief};
 use crate::progress::Progress;
@@ -64,6 +64,9 @@ impl Solution {
                     strata,
                     self.planned_value < Some(assumed.discounted.mean),
                 )],
+                None if self.graph().is_some() => {
+                    vec!["what is planned is so on cells, and these are coarse; more `cells` in [belief] come nearer".to_owned()]
+                }
                 None => reasons(&scenario.model),
             };
             remarks.push(match reasons.is_empty() {
@@ -95,7 +98,7 @@ impl Solution {
 }
 
 impl Solution {
-    /// What the scenario's rule of thumb earns on beliefs that are kept as those of this solution.
+    /// What the scenario's rule of thumb earns on beliefs that are kept as those of this solution, or, where it keeps none, as the model asks.
     fn by_rule(
         &self,
         scenario: &Scenario,
@@ -104,8 +107,9 @@ impl Solution {
     ) -> Option<Evaluation> {
         let rule = scenario.rule.as_ref()?;
         let updater = match &self.policy {
-            Solved::Automaton(automaton) => &automaton.updater,
-            Solved::Rule { updater, .. } => updater,
+            Solved::Automaton(automaton) => automaton.updater.clone(),
+            Solved::Rule { updater, .. } => updater.clone(),
+            Solved::Graph(_) => Updater::of(&scenario.model).ok()?,
             Solved::Control(_) => return None,
         };
         let space = updater.space(&scenario.model);
@@ -120,7 +124,7 @@ impl Solution {
         let updater = match &self.policy {
             Solved::Automaton(automaton) => &automaton.updater,
             Solved::Rule { updater, .. } => updater,
-            Solved::Control(_) => return None,
+            Solved::Graph(_) | Solved::Control(_) => return None,
         };
         updater.codebook().map(Codebook::len)
     }
