@@ -14,11 +14,14 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+use super::SOLVER;
 use super::backup::Backup;
+use super::occupied::shares;
 use super::point::{ValueVector, VectorSet};
 use crate::belief::Keeping;
-use crate::model::ActionId;
+use crate::model::{ActionId, Model};
 use crate::parallel;
+use crate::policy::{GraphNode, PolicyGraph};
 
 /// Values of nodes are iterated until they change by less than this share of the largest, or so often.
 const CLOSE: f64 = 1e-8;
@@ -122,6 +125,25 @@ impl<'a> Grapher<'a> {
             value: self.backup.start.expected(&values[0]),
             nodes,
             values,
+        }
+    }
+
+    /// The graph as it is kept: what it earns in an episode, and what of it is met there.
+    pub(super) fn told(&self, model: &Model, graph: &Graph) -> PolicyGraph {
+        let length = model.episode.length;
+        let shares = shares(self, graph, length);
+        let ways = shares.visits.into_iter().zip(shares.gone);
+        let nodes = graph.nodes.iter().zip(ways);
+        let nodes = nodes.map(|(node, (visits, gone))| GraphNode {
+            action: node.action,
+            next: node.next.clone(),
+            visits,
+            gone,
+        });
+        PolicyGraph {
+            planned_value: Some(self.earned(&graph.nodes, length)),
+            nodes: nodes.collect(),
+            ..PolicyGraph::new(model, SOLVER)
         }
     }
 

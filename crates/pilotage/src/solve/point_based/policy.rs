@@ -7,10 +7,10 @@ use std::sync::Arc;
 use super::backup::Backup;
 use super::graph::{self, Grapher};
 use super::point::{Point, ValueVector, VectorSet};
-use super::{SOLVER, occupied, size};
+use super::{occupied, size};
 use crate::belief::{Belief, Cells, CellsKeeping, Codebook, Held, Keeping, Moments};
 use crate::model::{ActionId, Model};
-use crate::policy::{GraphNode, Policy, PolicyGraph};
+use crate::policy::{Policy, PolicyGraph};
 use crate::progress::Progress;
 use crate::solve::Size;
 
@@ -62,20 +62,7 @@ impl PointBasedPolicy {
         let whole = graph::merged(grapher.of(&self.set));
         let found = size::sized(&grapher, whole, limits, observer);
         let found = occupied::settled(&grapher, found, model.episode.length);
-        let shares = occupied::shares(&grapher, &found, model.episode.length);
-        let ways = shares.visits.into_iter().zip(shares.gone);
-        let nodes = found.nodes.iter().zip(ways);
-        let nodes = nodes.map(|(node, (visits, gone))| GraphNode {
-            action: node.action,
-            next: node.next.clone(),
-            visits,
-            gone,
-        });
-        Some(PolicyGraph {
-            planned_value: Some(grapher.earned(&found.nodes, model.episode.length)),
-            nodes: nodes.collect(),
-            ..PolicyGraph::new(model, SOLVER)
-        })
+        Some(grapher.told(model, &found))
     }
 
     /// What each action is worth by one look ahead at what may be sensed. It takes as long as a backup, and the best is never worth less

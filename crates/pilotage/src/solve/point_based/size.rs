@@ -7,7 +7,7 @@ use crate::progress::Progress;
 use crate::solve::Size;
 
 /// Shares of the nodes that are left at a time where a graph is made smaller at any cost: each way ends elsewhere, and the best counts.
-const LEAVES: [f64; 3] = [0.6, 0.8, 0.9];
+const LEAVES: [f64; 4] = [0.6, 0.8, 0.9, 0.95];
 
 /// Times that a graph is made smaller and better in turns, at most.
 const TURNS: usize = 5;
