@@ -8,6 +8,7 @@
 //!
 //! | solver | what it does |
 //! |---|---|
+//! | [`PointBased`] | backs up values of policies at beliefs on cells; policy graphs for discrete sensors |
 //! | [`CodebookPlanner`] | value iteration on strata and means of beliefs of any kind |
 //! | [`ValueIteration`] | value iteration on levels and means, for models of at most three variables |
 //! | [`Kbvi`] | the thesis' search of action sequences that are fixed in advance |
