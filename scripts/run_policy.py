@@ -3,7 +3,8 @@
     python3 scripts/run_policy.py policy.json < readings.csv
 
 Standard input has the readings of a step on a line, comma-separated, in the order of the sensor, each sensed after the action that was printed
-before; a line `nothing` says that they are missing, a line `start` begins a new episode. Written from docs/policy-format.md, with nothing but Python's standard library.
+before; a line `nothing` says that they are missing, a line `start` begins a new episode. For a policy graph a line has the name of the signal, and
+there is no belief to print. Written from docs/policy-format.md, with nothing but Python's standard library.
 """
 
 import csv
@@ -209,6 +210,8 @@ def main(path):
     if content["checksum"] != checksum(text):
         sys.exit(f"{path}: damaged: its checksum is {content['checksum']}, that of its policy {checksum(text)}")
     policy = content["policy"]
+    if "signals" in policy:
+        return run_graph(policy)
     runner, out = Policy(policy), csv.writer(sys.stdout, lineterminator="\n")
     out.writerow(["step", "level", "mode", *policy["states"], "node", "action"])
     for step, line in enumerate(lines()):
@@ -219,6 +222,23 @@ def main(path):
         node = runner.node()
         action = policy["nodes"][node]["action"]
         out.writerow([step, runner.level, runner.mode, *runner.mean, node, policy["actions"][action]])
+        sys.stdout.flush()
+
+
+def run_graph(policy):
+    out = csv.writer(sys.stdout, lineterminator="\n")
+    out.writerow(["step", "node", "action"])
+    signals = [*policy["signals"], "nothing"]
+    for step, line in enumerate(lines()):
+        if line == "start":
+            node = 0
+        elif line not in signals:
+            sys.exit(f"line {step}: `{line}` where {', '.join(signals)} or start belongs")
+        else:
+            # A signal may itself be called `nothing`: the missing reading is the last.
+            signal = len(signals) - 1 if line == "nothing" else signals.index(line)
+            node = (policy["nodes"][node].get("next") or [node] * len(signals))[signal]
+        out.writerow([step, node, policy["actions"][policy["nodes"][node]["action"]]])
         sys.stdout.flush()
 
 

@@ -4,8 +4,8 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use pilotage::policy::write_whole;
-use pilotage_report::{automaton_svg, belief_map_svg};
+use pilotage::policy::{Saved, write_whole};
+use pilotage_report::{automaton_svg, belief_map_svg, graph_svg};
 
 use crate::failure::Failure;
 use crate::options::{beside, policy_and_problem, shown};
@@ -23,19 +23,23 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let (automaton, scenario) =
-        policy_and_problem(&arguments.policy, arguments.problem.as_deref())?;
-    let space = automaton.space(&scenario.model);
-    if let Some(mdp) = space.as_mdp() {
-        mdp.check()?;
-    }
-    let pictures = [
-        ("automaton.svg", automaton_svg(&automaton)?),
-        (
-            "map.svg",
-            belief_map_svg(space.as_ref(), &automaton, Some(&automaton))?,
-        ),
-    ];
+    let (policy, scenario) = policy_and_problem(&arguments.policy, arguments.problem.as_deref())?;
+    let pictures = match &policy {
+        Saved::Graph(graph) => vec![("graph.svg", graph_svg(graph)?)],
+        Saved::Automaton(automaton) => {
+            let space = automaton.space(&scenario.model);
+            if let Some(mdp) = space.as_mdp() {
+                mdp.check()?;
+            }
+            vec![
+                ("automaton.svg", automaton_svg(automaton)?),
+                (
+                    "map.svg",
+                    belief_map_svg(space.as_ref(), automaton, Some(automaton))?,
+                ),
+            ]
+        }
+    };
     let mut out = std::io::stdout().lock();
     for (suffix, picture) in pictures {
         let beside = beside(&arguments.policy, suffix);

@@ -43,7 +43,7 @@ enum Verb {
     Solve(Box<solve::Arguments>),
     /// Run a saved policy and measure what it earns.
     Simulate(simulate::Arguments),
-    /// Draw a saved policy: its automaton and its map of beliefs, as SVG.
+    /// Draw a saved policy, its automaton and its map of beliefs, or its graph, as SVG.
     Draw(draw::Arguments),
     /// Make every table and figure of the thesis again, with a verdict on each.
     Reproduce(reproduce::Arguments),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use pilotage::error::visible;
-use pilotage::policy::Automaton;
+use pilotage::policy::Saved;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate;
 
@@ -70,24 +70,24 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 pub fn policy_and_problem(
     policy: &Path,
     problem: Option<&Path>,
-) -> Result<(Automaton, Scenario), Failure> {
-    let automaton = Automaton::load(policy)?;
+) -> Result<(Saved, Scenario), Failure> {
+    let saved = Saved::load(policy)?;
     let origin = shown(policy);
     let scenario = match problem {
         Some(problem) => scenario::find(problem)?,
         // A file says whose policy it is, not which other files are read.
-        None => match scenario::find_builtin(&automaton.problem) {
+        None => match scenario::find_builtin(saved.problem()) {
             Some(scenario) => scenario?,
             None => {
                 return Err(Failure::Usage(format!(
                     "{origin}: this policy is for {}, which is not built in; give its model file with --problem",
-                    automaton.problem
+                    saved.problem()
                 )));
             }
         },
     };
-    automaton.check_problem(&scenario.model, &origin)?;
-    Ok((automaton, scenario))
+    saved.check_problem(&scenario.model, &origin)?;
+    Ok((saved, scenario))
 }
 
 /// A file name as it is typed in a shell: in quotes where it needs them, and never taken for an option.

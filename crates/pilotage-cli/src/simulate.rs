@@ -7,10 +7,11 @@ use std::time::Instant;
 use clap::Args;
 use pilotage::Error;
 use pilotage::belief::BeliefMdp;
-use pilotage::policy::{Automaton, AutomatonRunner};
+use pilotage::policy::{AutomatonRunner, GraphRunner, Saved};
 use pilotage::scenario::{self, Scenario};
-use pilotage::simulate::evaluate;
 use pilotage::simulate::wake_up::{Settings, measure};
+use pilotage::simulate::{Agent, evaluate, evaluate_agent};
+use pilotage::solve::Form;
 use serde_json::json;
 
 use crate::failure::Failure;
@@ -40,34 +41,38 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.evaluation.start_threads()?;
-    let (automaton, scenario) = policy_and_problem(&arguments.policy, Some(&arguments.problem))?;
+    let (policy, scenario) = policy_and_problem(&arguments.policy, Some(&arguments.problem))?;
     let bars = Bars::new(arguments.json);
     if arguments.wake_up {
-        return wake_up(arguments, &scenario, &automaton, &bars);
+        return wake_up(arguments, &scenario, &policy, &bars);
     }
     let world = match &arguments.world {
         None => scenario,
         Some(world) => {
             let world = scenario::find(world)?;
-            automaton.check_world(&world.model, &shown(&arguments.policy))?;
+            policy.check_world(&world.model, &shown(&arguments.policy))?;
             world
         }
     };
     let clock = Instant::now();
-    let evaluation = evaluate(
-        &world,
-        &automaton.updater,
-        &AutomatonRunner::new(&automaton),
-        arguments.evaluation.options(),
-        &bars,
-    );
+    let options = arguments.evaluation.options();
+    let evaluation = match &policy {
+        Saved::Automaton(automaton) => {
+            let runner = AutomatonRunner::new(automaton);
+            evaluate(&world, &automaton.updater, &runner, options, &bars)
+        }
+        Saved::Graph(graph) => {
+            let agent = || -> Box<dyn Agent> { Box::new(GraphRunner::new(graph)) };
+            evaluate_agent(&world, &agent, options, &bars)
+        }
+    };
     evaluation.check()?;
     let seconds = clock.elapsed().as_secs_f64();
     let mut out = std::io::stdout().lock();
     if arguments.json {
-        let mut report = identity(&automaton, arguments.evaluation.seed);
+        let mut report = identity(&policy, arguments.evaluation.seed);
         report["world"] = json!(world.model.name);
-        report["planned_value"] = json!(automaton.planned_value);
+        report["planned_value"] = json!(policy.planned_value());
         report["evaluation"] = json!(evaluation);
         report["seconds"] = json!({ "evaluate": seconds });
         writeln!(out, "{report}")?;
@@ -75,16 +80,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         writeln!(
             out,
             "{}",
-            summary::heading(
-                &world.model.name,
-                &automaton.solver,
-                Some(automaton.nodes.len())
-            )
+            summary::heading(&world.model.name, policy.solver(), Some(policy.nodes()))
         )?;
         write!(
             out,
             "{}",
-            summary::evaluation(&evaluation, automaton.planned_value)
+            summary::evaluation(&evaluation, policy.planned_value())
         )?;
     }
     Ok(())
@@ -93,17 +94,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn wake_up(
     arguments: &Arguments,
     Scenario { model, truth, .. }: &Scenario,
-    automaton: &Automaton,
+    saved: &Saved,
     bars: &Bars,
 ) -> Result<(), Failure> {
-    if automaton.updater.filter().is_none() {
-        return Err(Error::Unsupported {
-            solver: "wake-up",
-            model: model.name.clone(),
-            reason: "its hypotheses are followed by filters, and this policy keeps its belief in full, in which all starts are already; simulate it without --wake-up, or solve with value-iteration".to_owned(),
+    let refused = |why: &str| Error::Unsupported {
+        solver: "wake-up",
+        model: model.name.clone(),
+        reason: format!(
+            "its hypotheses are followed by filters, and this policy {why}; simulate it without --wake-up, or solve with value-iteration"
+        ),
+    };
+    let automaton = match saved {
+        Saved::Graph(_) => return Err(refused("keeps no belief").into()),
+        Saved::Automaton(automaton) if automaton.updater.filter().is_none() => {
+            let why = "keeps its belief in full, in which all starts are already";
+            return Err(refused(why).into());
         }
-        .into());
-    }
+        Saved::Automaton(automaton) => automaton,
+    };
     let settings = Settings {
         episodes: arguments.evaluation.episodes,
         seed: arguments.evaluation.seed,
@@ -114,7 +122,7 @@ fn wake_up(
     let result = measure(&BeliefMdp::new(model), truth, &policy, &settings, bars)?;
     let mut out = std::io::stdout().lock();
     if arguments.json {
-        let mut report = identity(automaton, settings.seed);
+        let mut report = identity(saved, settings.seed);
         report["wake_up"] = json!(result);
         report["seconds"] = json!({ "evaluate": clock.elapsed().as_secs_f64() });
         writeln!(out, "{report}")?;
@@ -163,14 +171,17 @@ fn wake_up(
 }
 
 /// What every report begins with.
-fn identity(automaton: &Automaton, seed: u64) -> serde_json::Value {
+fn identity(policy: &Saved, seed: u64) -> serde_json::Value {
     json!({
         "pilotage": env!("CARGO_PKG_VERSION"),
-        "problem": automaton.problem,
-        "solver": automaton.solver,
-        "policy": automaton.matching,
+        "problem": policy.problem(),
+        "solver": policy.solver(),
+        "policy": match policy {
+            Saved::Automaton(automaton) => json!(automaton.matching),
+            Saved::Graph(_) => json!(Form::Graph.name()),
+        },
         "seed": seed,
-        "nodes": automaton.nodes.len(),
+        "nodes": policy.nodes(),
     })
 }
 

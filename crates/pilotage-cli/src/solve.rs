@@ -9,7 +9,7 @@ use pilotage::policy::{check_writable, write_whole};
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::Estimate;
 use pilotage::solve::bound;
-use pilotage::solve::{Earned, Entry, Form, Registry, Request, Solution, Solver, solve};
+use pilotage::solve::{Earned, Entry, Form, Registry, Request, Solution, Solved, Solver, solve};
 use pilotage_report::{returns_svg, values_svg};
 use serde_json::json;
 
@@ -28,19 +28,20 @@ pub struct Arguments {
     /// Solver to use (see `pilotage list`); default: the first planner that accepts the problem.
     #[arg(long, value_name = "SOLVER")]
     with: Option<String>,
-    /// Form of the policy: tree, nearest, segments, or grid (the planner itself, not compiled); default: what suits the solver.
+    /// Form of the policy: tree, nearest, segments, graph (which needs no belief, for discrete sensors), or grid (the planner itself, not
+    /// compiled); default: what suits the solver.
     #[arg(long, value_name = "FORM")]
     policy: Option<String>,
-    /// Most nodes of a tree; default: as many as it takes.
+    /// Most nodes of a tree or graph; default: as many as it takes.
     #[arg(long, value_name = "NODES", value_parser = at_least_one)]
     nodes: Option<usize>,
-    /// Return that a tree may lose, as a share of that of the plan [default: 0.01].
+    /// Return that a tree or graph may lose, as a share of that of the plan [default: 0.01].
     #[arg(long, value_name = "SHARE")]
     loss: Option<f64>,
     /// Write the policy to this file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Measure what compiling the planner into an automaton cost, over the same episodes.
+    /// Measure what compiling the planner into an automaton or graph cost, over the same episodes.
     #[arg(long)]
     value_lost: bool,
     /// Find an upper bound on what any policy can earn where the model holds.
@@ -331,9 +332,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (solver, runs) = arguments.told.solver(&registry, entry)?;
     let solver = &solver;
     let form = asked.unwrap_or_else(|| solver.form());
-    if form != Form::Tree && (arguments.nodes.is_some() || arguments.loss.is_some()) {
+    if !form.has_size() && (arguments.nodes.is_some() || arguments.loss.is_some()) {
         return Err(Failure::Usage(
-            "--nodes and --loss say how small a tree is; choose --policy tree".to_owned(),
+            "--nodes and --loss say how small a tree or graph is; choose --policy tree or graph"
+                .to_owned(),
         ));
     }
     if arguments.out.is_some() && !solver.makes_automaton(&scenario.model) {
@@ -343,6 +345,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             scenario.model.name
         )));
     }
+    solver.gives(form, &scenario.model)?;
     let request = Request {
         form,
         seed: arguments.evaluation.seed,
@@ -359,8 +362,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let solution = solve(solver, &scenario, &request, &bars)?;
     let solve_seconds = clock.elapsed().as_secs_f64();
     // What was found is shown all the same where it cannot be kept: it may have taken hours.
-    let kept = match (&arguments.out, solution.automaton()) {
-        (Some(path), Some(automaton)) => automaton.save(path).map(|()| true),
+    let kept = match (&arguments.out, &solution.policy) {
+        (Some(path), Solved::Automaton(automaton)) => automaton.save(path).map(|()| true),
+        (Some(path), Solved::Graph(graph)) => graph.save(path).map(|()| true),
         _ => Ok(false),
     };
     let curves = arguments.learner.draw(&solution)?;
@@ -408,8 +412,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         if let Some(lost) = lost {
             writeln!(
                 out,
-                "  lost in compiling    {} (the planner's return less the automaton's, same episodes)",
-                summary::estimate(&lost)
+                "  lost in compiling    {} (the planner's return less that of the {}, same episodes)",
+                summary::estimate(&lost),
+                if solution.graph().is_some() {
+                    "graph"
+                } else {
+                    "automaton"
+                }
             )?;
         }
         for file in curves {
@@ -439,7 +448,16 @@ fn value_lost(
     let options = arguments.evaluation.options();
     solution
         .value_lost(&planner, scenario, options, bars)
-        .ok_or_else(|| Failure::Usage("--value-lost compares an automaton with the planner it was compiled from; choose --policy tree, nearest or segments".to_owned()))
+        .ok_or_else(|| Failure::Usage("--value-lost compares an automaton or graph with the planner it was made from; choose --policy tree, nearest, segments or graph".to_owned()))
+}
+
+/// The form that a policy has.
+fn form(solution: &Solution) -> serde_json::Value {
+    match &solution.policy {
+        Solved::Automaton(automaton) => json!(automaton.matching),
+        Solved::Graph(_) => json!(Form::Graph.name()),
+        Solved::Control(_) | Solved::Rule { .. } => json!(Form::Grid.name()),
+    }
 }
 
 fn report(
@@ -454,12 +472,12 @@ fn report(
         "pilotage": env!("CARGO_PKG_VERSION"),
         "problem": scenario.model.name,
         "solver": solver.name(),
-        "policy": solution.automaton().map_or(json!(Form::Grid.name()), |automaton| json!(automaton.matching)),
+        "policy": form(solution),
         "seed": arguments.evaluation.seed,
         "converged": solution.converged,
         "policy_convergence_horizon": solution.policy_convergence_horizon,
         "levels": solution.levels,
-        "nodes": solution.automaton().map(|automaton| automaton.nodes.len()),
+        "nodes": solution.nodes(),
         "planned_value": solution.planned_value,
         "samples": solution.samples,
         "evaluation_assumed": earned.assumed,
@@ -480,9 +498,13 @@ fn shown(
     kept: bool,
     (solve, evaluate): (f64, f64),
 ) -> String {
-    let nodes = solution.automaton().map(|automaton| automaton.nodes.len());
-    let mut lines = vec![summary::heading(&scenario.model.name, solver.name(), nodes)];
+    let mut lines = vec![summary::heading(
+        &scenario.model.name,
+        solver.name(),
+        solution.nodes(),
+    )];
     lines.extend(solution.automaton().map(summary::nodes));
+    lines.extend(solution.graph().map(summary::graph));
     lines.push(String::new());
     lines.push(summary::earned(
         earned,

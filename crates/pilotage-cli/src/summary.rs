@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use comfy_table::presets;
 use comfy_table::{CellAlignment, Table};
-use pilotage::policy::{Automaton, Place};
+use pilotage::policy::{Automaton, Place, PolicyGraph};
 use pilotage::simulate::{Estimate, Evaluation};
 use pilotage::solve::Earned;
 use pilotage::solve::bound::Bound;
@@ -159,6 +159,22 @@ pub fn nodes(automaton: &Automaton) -> String {
         false => format!("\n\n{tree}"),
     };
     format!("{}{more}{tree}", table.trim_fmt())
+}
+
+/// A policy graph in words; of a large one the first nodes.
+pub fn graph(graph: &PolicyGraph) -> String {
+    let words = graph.in_words();
+    let lines: Vec<String> = words
+        .lines()
+        .take(ROWS)
+        .map(|line| format!("  {line}"))
+        .collect();
+    let rest = graph.nodes.len().saturating_sub(ROWS);
+    let more = match rest {
+        0 => String::new(),
+        rest => format!("\n  and {rest} more; --out FILE keeps them all"),
+    };
+    lines.join("\n") + &more
 }
 
 fn levels((first, last): (usize, usize)) -> String {

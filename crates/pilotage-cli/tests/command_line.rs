@@ -400,3 +400,72 @@ fn the_model_of_the_readme_can_be_solved() {
     printed(&["solve", file, "--episodes", "100", "--out", policy]);
     printed(&["draw", policy, "--problem", file]);
 }
+
+/// A policy graph is solved for, kept, run and drawn like any other policy, and where there is none it is said what would do.
+#[test]
+fn a_policy_graph_goes_the_whole_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let policy = folder.path().join("graph.json");
+    let policy = policy.to_str().unwrap();
+    let solve = [
+        "solve",
+        "light-dark-binary",
+        "--policy",
+        "graph",
+        "--nodes",
+        "8",
+        "--set",
+        "beliefs=100",
+        "--set",
+        "rounds=2",
+        "--episodes",
+        "300",
+    ];
+    let shown = printed(&[&solve[..], &["--out", policy]].concat());
+    for part in [
+        "solved with point-based",
+        "on bright go to ",
+        "planned",
+        "rule of thumb",
+    ] {
+        assert!(shown.contains(part), "{shown}");
+    }
+    let told: Value = serde_json::from_str(&json(&[&solve[..], &["--json"]].concat())).unwrap();
+    assert_eq!(told["policy"], "graph");
+    assert!(told["nodes"].as_u64().unwrap() <= 8);
+
+    let simulate = ["simulate", "light-dark-binary", "--policy", policy];
+    let again = json(&[&simulate[..], &["--episodes", "300", "--json"]].concat());
+    let again: Value = serde_json::from_str(&again).unwrap();
+    assert_eq!(again["policy"], "graph");
+    assert_eq!(again["evaluation"], told["evaluation"]);
+    assert_eq!(again["planned_value"], told["planned_value"]);
+    let lost = refused(&[&simulate[..], &["--wake-up"]].concat());
+    assert!(lost.contains("keeps no belief"), "{lost}");
+    let elsewhere = refused(&[&simulate[..], &["--world", "light-dark-5"]].concat());
+    assert!(
+        elsewhere.contains("choose a world with the same"),
+        "{elsewhere}"
+    );
+
+    let drawn = printed(&["draw", policy]);
+    assert!(drawn.trim_end().ends_with("graph-graph.svg"), "{drawn}");
+    let drawn = fs::read_to_string(drawn.trim_end()).unwrap();
+    assert!(drawn.contains("Policy graph of light-dark-binary"));
+
+    let continuous = refused(&["solve", "light-dark-5", "--policy", "graph"]);
+    for part in ["needs a discrete sensor", "such as tree"] {
+        assert!(continuous.contains(part), "{continuous}");
+    }
+    let other = refused(&[
+        "solve",
+        "light-dark-binary",
+        "--with",
+        "codebook",
+        "--policy",
+        "graph",
+    ]);
+    assert!(other.contains("use point-based"), "{other}");
+    let size = refused(&["solve", "corridor", "--policy", "grid", "--nodes", "3"]);
+    assert!(size.contains("choose --policy tree or graph"), "{size}");
+}

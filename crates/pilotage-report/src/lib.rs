@@ -22,6 +22,7 @@ mod axes;
 mod belief_map;
 mod curve;
 mod finding;
+mod graph;
 mod layout;
 mod learning;
 mod page;
@@ -40,6 +41,7 @@ pub use curve::{Series, curves_svg};
 pub use finding::{
     Algorithm, Figure, Finding, Frame, Hypothesis, Recording, Report, Table, Verdict,
 };
+pub use graph::graph_svg;
 pub use learning::{returns_svg, values_svg};
 pub use page::{page_html, page_markdown, tables_csv};
 pub use record::{Take, record};

@@ -138,7 +138,8 @@ fn run(
 fn believed(space: &dyn BeliefSpace, agent: &dyn Agent) -> (usize, Vec<Hypothesis>) {
     let mut hypotheses = agent.hypotheses();
     hypotheses.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let acted_on = |&(_, belief): &(f64, &Belief)| std::ptr::eq(belief, agent.belief());
+    let own = agent.belief();
+    let acted_on = |&(_, belief): &(f64, &Belief)| own.is_some_and(|own| std::ptr::eq(belief, own));
     let valid = hypotheses.iter().position(acted_on).unwrap_or(0);
     let drawn = hypotheses.into_iter().map(|(weight, belief)| Hypothesis {
         weight,

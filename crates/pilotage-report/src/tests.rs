@@ -6,7 +6,7 @@ use super::svg::text_width;
 use super::*;
 use pilotage::belief::{Belief, BeliefMdp};
 use pilotage::model::ActionId;
-use pilotage::policy::{Automaton, Matching, Node, Place, Policy};
+use pilotage::policy::{Automaton, GraphNode, Matching, Node, Place, Policy, PolicyGraph};
 use pilotage::progress::Silent;
 use pilotage::scenario;
 use pilotage::solve::compile;
@@ -203,6 +203,64 @@ fn assert_names_actions(svg: &str, names: &[String]) {
 #[test]
 fn automaton_by_hand() {
     insta::assert_snapshot!(automaton_svg(&by_hand()).expect("sound"));
+}
+
+/// A chain of four nodes that do the same, a loop, a way that is never gone, and one that ends.
+fn graph_by_hand() -> PolicyGraph {
+    let node = |action, next: &[usize], visits, gone: &[f64]| GraphNode {
+        action,
+        next: next.to_vec(),
+        visits,
+        gone: gone.to_vec(),
+    };
+    let light = scenario::find("light-dark-binary")
+        .expect("a built-in model")
+        .model;
+    PolicyGraph {
+        nodes: vec![
+            node(1, &[1, 0, 4], 0.4, &[0.1, 0.3, 0.0]),
+            node(2, &[2, 2, 2], 0.1, &[0.05, 0.05, 0.0]),
+            node(2, &[3, 3, 2], 0.1, &[0.05, 0.05, 0.0]),
+            node(2, &[5, 4, 4], 0.1, &[0.05, 0.05, 0.0]),
+            node(1, &[1, 3, 3], 0.1, &[0.05, 0.05, 0.0]),
+            node(0, &[], 0.2, &[]),
+        ],
+        ..PolicyGraph::new(&light, "hand")
+    }
+}
+
+#[test]
+fn policy_graph_by_hand() {
+    insta::assert_snapshot!(graph_svg(&graph_by_hand()).expect("sound"));
+}
+
+#[test]
+fn policy_graphs_of_every_size_are_readable() {
+    for count in [1, 2, 3, 7, 15, 24, 40, 41, 90] {
+        for known in [true, false] {
+            let mut graph = graph_by_hand();
+            let visits = f64::from(known) / count as f64;
+            let node = |k: usize| GraphNode {
+                action: k % 3,
+                next: [k * 7 + 3, k + 1, k / 2].map(|j| j % count).into(),
+                visits,
+                gone: vec![0.5 * visits, 0.5 * visits, 0.0],
+            };
+            graph.nodes = (0..count).map(node).collect();
+            let svg = graph_svg(&graph).expect("sound");
+            assert_sound(&svg);
+            assert_names_actions(&svg, &graph.actions);
+        }
+    }
+    let mut graph = graph_by_hand();
+    graph.nodes[0].next[0] = 6;
+    let error = graph_svg(&graph).expect_err("it leads nowhere").to_string();
+    assert!(
+        error.contains("node 0 leads to a node that is not there"),
+        "{error}"
+    );
+    graph.nodes.clear();
+    assert!(graph_svg(&graph).is_err());
 }
 
 #[test]

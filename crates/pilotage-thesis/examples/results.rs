@@ -36,7 +36,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         );
         println!("|---|---|---|--:|--:|--:|--:|--:|--:|");
         for (label, solver) in planners()? {
-            for form in Form::ALL {
+            let given = |form: &Form| solver.gives(*form, &scenario.model).is_ok();
+            for form in Form::ALL.into_iter().filter(given) {
                 if let Some(evaluation) = row(&scenario, &solver, label, form)? {
                     earned.push(((name, solver.name(), label, form), evaluation));
                 }

@@ -145,8 +145,8 @@ fn mode_seen(scenario: &Scenario, policy: &dyn Policy, options: Options) -> Eval
             self.filter
                 .update(&mut self.belief, action, reading, &mut self.scratch);
         }
-        fn belief(&self) -> &Belief {
-            &self.belief
+        fn belief(&self) -> Option<&Belief> {
+            Some(&self.belief)
         }
     }
     let filter = BeliefMdp::new(model).filter();

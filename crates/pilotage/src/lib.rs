@@ -45,7 +45,7 @@
 //! | [`scenario`] | a model, and what is true where that differs; model files | [`find`](scenario::find), [`Scenario`](scenario::Scenario) |
 //! | [`belief`] | what the agent knows, and what planners ask | [`Belief`](belief::Belief), [`Tracker`](belief::Tracker), [`BeliefMdp`](belief::BeliefMdp) |
 //! | [`solve`] | planners and learners | [`plan`](solve::plan), [`learn`](solve::learn), [`Registry`](solve::Registry) |
-//! | [`policy`] | what to do at a belief | [`Automaton`](policy::Automaton), [`AutomatonRunner`](policy::AutomatonRunner) |
+//! | [`policy`] | what to do at a belief, or after a signal | [`Automaton`](policy::Automaton), [`AutomatonRunner`](policy::AutomatonRunner), [`PolicyGraph`](policy::PolicyGraph) |
 //! | [`world`] | what happens; no agent looks inside | [`World`](world::World), [`ProblemWorld`](world::ProblemWorld) |
 //! | [`simulate`] | what a policy earns in a world | [`evaluate`](simulate::evaluate), [`compare`](simulate::compare) |
 //! | [`progress`] | watching all this at work | [`Progress`](progress::Progress), [`Silent`](progress::Silent) |

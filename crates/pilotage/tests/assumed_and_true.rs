@@ -110,6 +110,7 @@ impl Case {
 fn text_of(scenario: &Scenario, solution: &Solution) -> String {
     let plan = match &solution.policy {
         Solved::Automaton(automaton) => automaton.to_json().unwrap(),
+        Solved::Graph(graph) => graph.to_json().unwrap(),
         Solved::Control(_) => panic!("none of these models has a cost"),
         Solved::Rule { policy, updater } => {
             let model = &scenario.model;
@@ -162,7 +163,8 @@ fn no_world_changes_a_plan_or_its_automaton() {
                 true => (&[Form::Tree][..], 1),
                 false => (&Form::ALL[..], case.worlds.len()),
             };
-            for &form in forms {
+            let given = |form: &&Form| solver.gives(**form, &base.model).is_ok();
+            for &form in forms.iter().filter(given) {
                 let planned = |scenario: &Scenario| {
                     let solution = solve(&solver, scenario, &short(form), &Silent).unwrap();
                     text_of(scenario, &solution)

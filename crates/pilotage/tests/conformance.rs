@@ -7,7 +7,7 @@ use common::{short, small};
 use pilotage::Error;
 use pilotage::belief::{Belief, BeliefSpace};
 use pilotage::model::{Interval, Model, Region};
-use pilotage::policy::{Automaton, AutomatonRunner, Policy};
+use pilotage::policy::{Automaton, AutomatonRunner, Policy, PolicyGraph, Saved};
 use pilotage::progress::Silent;
 use pilotage::random::{Rng, Role, normal, stream};
 use pilotage::scenario::{self, Scenario};
@@ -127,6 +127,25 @@ fn check_automaton(mdp: &dyn BeliefSpace, automaton: &Automaton, what: &str) {
     loaded.check_problem(mdp.model(), "policy.json").unwrap();
 }
 
+/// All of a graph is reached and met or not, and a saved one is the same one.
+fn check_graph(model: &Model, graph: &PolicyGraph, what: &str) {
+    let visits: f64 = graph.nodes.iter().map(|node| node.visits).sum();
+    assert!(
+        (visits - 1.0).abs() < 1e-9,
+        "{what}: visits sum to {visits}"
+    );
+    assert_eq!(graph.in_words().lines().count(), graph.nodes.len());
+    assert_eq!(graph.signals, model.laws.symbols, "{what}");
+    let Saved::Graph(loaded) = Saved::from_json(&graph.to_json().unwrap(), "policy.json").unwrap()
+    else {
+        panic!("{what}: no graph");
+    };
+    assert_eq!(&loaded, graph, "{what}");
+    let saved = Saved::Graph(loaded);
+    saved.check_problem(model, "policy.json").unwrap();
+    saved.check_world(model, "policy.json").unwrap();
+}
+
 fn check_value(scenario: &Scenario, solution: &Solution, what: &str) {
     let model = &scenario.model;
     let (low, high) = bounds(model);
@@ -157,7 +176,7 @@ fn check_value(scenario: &Scenario, solution: &Solution, what: &str) {
 
 #[test]
 fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
-    let mut solved = 0;
+    let (mut solved, mut graphs) = (0, 0);
     // Beliefs in full of three variables take minutes to keep without optimisation, and so do cells of two. Learners take many steps.
     let in_full = |model: &Model, entry: &Entry| entry.learns() && !model.body().is_linear();
     let quick = |model: &Model, entry: &Entry| match entry.name() {
@@ -170,6 +189,7 @@ fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
     });
     for (scenario, entry) in accepted {
         let model = &scenario.model;
+        let gives = |form: &Form| small(&entry, model).gives(*form, model).is_ok();
         // Beliefs in full are slow to keep without optimisation: the form that suits them, and on a line the planner itself. What is learned
         // has a form of its own.
         let learned = in_full(model, &entry);
@@ -178,8 +198,12 @@ fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
             .filter(|form| match model.is_linear() {
                 _ if learned => *form == Form::Tree,
                 true if entry.name() != "point-based" => true,
-                _ => *form == Form::Tree || (*form == Form::Grid && model.state_dim() == 1),
-            });
+                _ => {
+                    matches!(form, Form::Tree | Form::Graph)
+                        || (*form == Form::Grid && model.state_dim() == 1)
+                }
+            })
+            .filter(gives);
         for form in forms {
             let what = format!("{} with {} as {}", model.name, entry.name(), form.name());
             let solution = solve(&small(&entry, model), &scenario, &short(form), &Silent)
@@ -196,6 +220,11 @@ fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
                     assert_eq!(form, Form::Grid, "{what}");
                     check_policy(updater.space(model).as_ref(), policy.as_ref(), &what);
                 }
+                Solved::Graph(graph) => {
+                    assert_eq!(form, Form::Graph, "{what}");
+                    check_graph(model, graph, &what);
+                    graphs += 1;
+                }
                 Solved::Control(_) => assert!(model.cost.is_some(), "{what}"),
             }
             check_value(&scenario, &solution, &what);
@@ -203,6 +232,7 @@ fn every_solver_that_accepts_a_model_solves_it_in_every_form() {
         }
     }
     assert!(solved >= 180, "only {solved}");
+    assert!(graphs > 0);
 }
 
 #[test]

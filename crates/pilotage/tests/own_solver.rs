@@ -247,7 +247,7 @@ fn solved(name: &str, settings: &[(&str, &str)], scenario: &Scenario, form: Form
 #[test]
 fn a_planner_of_ones_own_is_set_compiled_and_evaluated_like_any_other() {
     let scenario = scenario::find("corridor-unbounded").unwrap();
-    for form in Form::ALL {
+    for form in Form::ALL.into_iter().filter(|form| *form != Form::Graph) {
         let solution = solved("mule", &[("action", "1")], &scenario, form);
         if let Some(automaton) = solution.automaton() {
             assert_eq!((automaton.solver.as_str(), form), ("stubborn", form));
@@ -259,6 +259,13 @@ fn a_planner_of_ones_own_is_set_compiled_and_evaluated_like_any_other() {
         };
         solution.evaluate(&scenario, options, &Silent).unwrap();
     }
+    let solver = registry().find("stubborn").unwrap().solver(&[]).unwrap();
+    let refused = solve(&solver, &scenario, &Request::form(Form::Graph), &Silent);
+    let said = refused.map(|_| ()).unwrap_err().to_string();
+    assert!(
+        said.contains("needs a discrete sensor") && said.contains("such as tree"),
+        "{said}"
+    );
     let entry = registry().find("stubborn").copied().unwrap();
     let error = entry.solver(&[("acton".to_owned(), "1".to_owned())]);
     let error = error.map(|_| ()).unwrap_err().to_string();

@@ -280,5 +280,5 @@ fn signals_move_a_belief_of_another_kind() {
         (right.mean - 16.0 / 17.0).abs() < 4.0 * right.stderr,
         "{right:?}"
     );
-    assert!(agent.belief().mean[0].abs() > 2.0);
+    assert!(agent.belief().unwrap().mean[0].abs() > 2.0);
 }

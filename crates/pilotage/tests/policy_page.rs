@@ -9,11 +9,11 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use common::automata::any_automaton;
+use common::automata::{any_automaton, sealed};
 use common::scenario;
 use pilotage::belief::Reading;
 use pilotage::model::Then;
-use pilotage::policy::{Automaton, AutomatonRunner};
+use pilotage::policy::{Automaton, AutomatonRunner, GraphRunner, Saved};
 use pilotage::progress::Silent;
 use pilotage::random::{Role, normal, stream};
 use pilotage::scenario::Scenario;
@@ -84,8 +84,8 @@ fn run(automaton: &Automaton, events: &[Event]) -> Vec<Row> {
     rows
 }
 
-/// The text of the page's runner; `None` where there is no Python 3.
-fn run_page(automaton: &Automaton, events: &[Event]) -> Option<String> {
+/// What the page's runner makes of a policy file and lines of input; `None` where there is no Python 3.
+fn run_script(file: &str, input: String) -> Option<String> {
     let version = Command::new("python3").arg("--version").output();
     if !version.is_ok_and(|version| version.status.success()) {
         println!("left out: there is no python3 here");
@@ -93,7 +93,7 @@ fn run_page(automaton: &Automaton, events: &[Event]) -> Option<String> {
     }
     let folder = tempfile::tempdir().unwrap();
     let policy = folder.path().join("policy.json");
-    automaton.save(&policy).unwrap();
+    std::fs::write(&policy, file).unwrap();
     let mut child = Command::new("python3")
         .arg("-B")
         .arg(root().join("scripts/run_policy.py"))
@@ -102,6 +102,16 @@ fn run_page(automaton: &Automaton, events: &[Event]) -> Option<String> {
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || stdin.write_all(input.as_bytes()));
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap().unwrap();
+    assert!(output.status.success());
+    Some(String::from_utf8(output.stdout).unwrap())
+}
+
+/// The text of the page's runner for an automaton.
+fn run_page(automaton: &Automaton, events: &[Event]) -> Option<String> {
     let mut readings = String::new();
     for event in events {
         let line = match event {
@@ -115,12 +125,7 @@ fn run_page(automaton: &Automaton, events: &[Event]) -> Option<String> {
         readings.push_str(&line);
         readings.push('\n');
     }
-    let mut stdin = child.stdin.take().unwrap();
-    let writer = std::thread::spawn(move || stdin.write_all(readings.as_bytes()));
-    let output = child.wait_with_output().unwrap();
-    writer.join().unwrap().unwrap();
-    assert!(output.status.success());
-    Some(String::from_utf8(output.stdout).unwrap())
+    run_script(&automaton.to_json().unwrap(), readings)
 }
 
 fn rows(csv: &str, states: usize) -> Vec<Row> {
@@ -356,6 +361,36 @@ fn the_example_of_the_page_is_true() {
     let says = block(&page, "csv");
     assert_eq!(rows(&says, 1), run(&automaton, &events));
     if let Some(csv) = run_page(&automaton, &events) {
+        assert_eq!(says, csv);
+    }
+}
+
+/// The graph of the page is one, and the page's runner goes through it as the library does.
+#[test]
+fn the_page_runs_graphs_as_the_library_does() {
+    let page = page();
+    let policy = block(page.split("### A policy graph").nth(1).unwrap(), "json");
+    let policy: serde_json::Value = serde_json::from_str(&policy).unwrap();
+    let file = sealed(serde_json::json!({
+        "format": 2, "pilotage": "0.2.0", "checksum": "", "policy": policy
+    }));
+    let Saved::Graph(graph) = Saved::from_json(&file, "docs/policy-format.md").unwrap() else {
+        panic!("the page's graph is none");
+    };
+    let words = "left nothing right left start left nothing right right left";
+    let mut runner = GraphRunner::new(&graph);
+    let mut says = "step,node,action\n".to_owned();
+    for (step, word) in ["start"].into_iter().chain(words.split(' ')).enumerate() {
+        let signal = graph.signals.iter().position(|signal| signal == word);
+        match (word, signal) {
+            ("start", _) => runner.reset(),
+            (_, Some(signal)) => runner.observe(Reading::Symbol(signal as u32)),
+            (_, None) => runner.observe(Reading::Nothing),
+        }
+        let (node, action) = runner.decide();
+        says += &format!("{step},{node},{}\n", graph.actions[action]);
+    }
+    if let Some(csv) = run_script(&file, words.replace(' ', "\n") + "\n") {
         assert_eq!(says, csv);
     }
 }

@@ -5,7 +5,7 @@ mod common;
 
 use std::path::PathBuf;
 
-use common::automata::{any_automaton, number, one_node};
+use common::automata::{any_automaton, any_graph, number, one_node};
 use pilotage::policy;
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -217,5 +217,16 @@ proptest! {
         if let Err(wrong) = check(&file) {
             prop_assert!(false, "{}", wrong);
         }
+    }
+
+    #[test]
+    fn every_graph_is_as_the_schema_says(graph in any_graph()) {
+        let file: Value = serde_json::from_str(&graph.to_json().unwrap()).unwrap();
+        if let Err(wrong) = check(&file) {
+            prop_assert!(false, "{}", wrong);
+        }
+        let mut bad = file;
+        bad["policy"]["nodes"][0]["mode"] = json!(0);
+        prop_assert!(check(&bad).is_err());
     }
 }

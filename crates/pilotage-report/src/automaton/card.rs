@@ -46,6 +46,21 @@ impl Card {
         }
     }
 
+    /// A card with its action, what is written on its strip, its share of all steps and the rows below.
+    pub fn new(action: usize, name: String, visits: Option<f64>, rows: Vec<String>) -> Self {
+        let mut tooltip = [vec![name.clone()], rows.clone()].concat().join(", ");
+        if let Some(visits) = visits {
+            tooltip += &format!(", {} of all steps", percent(visits));
+        }
+        Self {
+            action,
+            name,
+            visits,
+            rows,
+            tooltip,
+        }
+    }
+
     /// Width and height.
     pub fn size(&self) -> (f64, f64) {
         let strip = text_width(&self.name, NAME) * 1.1
@@ -57,10 +72,15 @@ impl Card {
             .iter()
             .map(|row| text_width(row, SMALL))
             .fold(strip, f64::max);
-        (
-            widest.ceil() + 2.0 * PAD,
-            STRIP + ROW * self.rows.len() as f64 + 8.0,
-        )
+        (widest.ceil() + 2.0 * PAD, STRIP + self.below())
+    }
+
+    /// Height of what is below the strip.
+    fn below(&self) -> f64 {
+        match self.rows.len() {
+            0 => 0.0,
+            rows => ROW * rows as f64 + 8.0,
+        }
     }
 
     /// Width of the frame: the more visits, the wider.
@@ -75,6 +95,10 @@ impl Card {
     /// The card around a centre, in a box of the given size.
     pub fn draw(&self, (x, y): Point, (width, height): (f64, f64)) -> Element {
         let (left, top) = (x - 0.5 * width, y - 0.5 * height);
+        let paper = match self.rows.is_empty() {
+            true => Paint::Hue(self.action),
+            false => Paint::Paper,
+        };
         let strip = format!(
             "M{l} {b}V{m}Q{l} {t} {i} {t}H{j}Q{r} {t} {r} {m}V{b}Z",
             l = svg::number(left),
@@ -90,13 +114,13 @@ impl Card {
             .child(
                 svg::rect((left, top), (width, height))
                     .with("rx", CORNER)
-                    .fill(Paint::Paper),
+                    .fill(paper),
             )
-            .child(
+            .children((!self.rows.is_empty()).then(|| {
                 Element::new("path")
                     .with("d", strip)
-                    .fill(Paint::Hue(self.action)),
-            )
+                    .fill(Paint::Hue(self.action))
+            }))
             .child(
                 svg::rect((left, top), (width, height))
                     .with("rx", CORNER)

@@ -316,6 +316,35 @@ impl Updater {
         })
     }
 
+    /// The updater that a model asks for. Beliefs in full are read as one stratum, that of the start, however they are held.
+    ///
+    /// # Errors
+    /// As [`CellsKeeping::new`].
+    pub(crate) fn of(model: &Model) -> Result<Self> {
+        let kind = model.tracker();
+        if kind == TrackerKind::Linear {
+            return Ok(BeliefMdp::new(model).filter().into());
+        }
+        let code = |moments: Moments| {
+            let mut codebook = Codebook::new(model);
+            codebook.cover(&[moments], 0.0, 1);
+            Arc::new(codebook)
+        };
+        let mut moments = Moments::default();
+        Ok(match kind {
+            TrackerKind::Cells => {
+                let keeping = Arc::new(CellsKeeping::new(model)?);
+                keeping.moments(&keeping.start(), &mut moments);
+                Self::Cells(Coded::new(model, keeping, code(moments)))
+            }
+            _ => {
+                let keeping = Arc::new(SumKeeping::new(model));
+                keeping.moments(&keeping.start(), &mut moments);
+                Self::Sum(Coded::new(model, keeping, code(moments)))
+            }
+        })
+    }
+
     /// What is believed at the start.
     pub fn start(&self) -> Held {
         let (kept, read) = match self {

@@ -8,8 +8,9 @@ use nalgebra::DMatrix;
 
 use super::coordinates::MOST_COORDINATES;
 use super::file::{
-    BeliefTable, CoordinateTable, Ends, FilterTable, LevelTable, MapTable, MemoryTable, NodeTable,
-    PolicyTable, RecallTable, Rows, SideTable, StepTable, StratumTable, SwitchTable, WallsTable,
+    BeliefTable, CoordinateTable, Ends, FilterTable, GraphNodeTable, GraphTable, LevelTable,
+    MapTable, MemoryTable, NodeTable, PolicyTable, RecallTable, Rows, SideTable, StepTable,
+    StratumTable, SwitchTable, WallsTable,
 };
 use super::{Branch, Feature, Matching, Place, Test};
 use crate::belief::LARGEST;
@@ -111,6 +112,34 @@ impl Sizes {
 
     fn action(&self, action: &usize) -> Checked {
         index(*action, self.actions, "actions")
+    }
+}
+
+impl GraphTable {
+    /// # Errors
+    /// The first fault found.
+    pub(super) fn check(&self) -> Checked {
+        plain(&self.problem).at("problem")?;
+        plain(&self.solver).at("solver")?;
+        optional(self.planned_value).at("planned_value")?;
+        names(&self.actions).at("actions")?;
+        names(&self.signals).at("signals")?;
+        some(&self.nodes).at("nodes")?;
+        each(&self.nodes, |node| node.check(self)).at("nodes")
+    }
+}
+
+impl GraphNodeTable {
+    fn check(&self, graph: &GraphTable) -> Checked {
+        let (nodes, ways) = (graph.nodes.len(), graph.signals.len() + 1);
+        index(self.action, graph.actions.len(), "actions").at("action")?;
+        if !self.next.is_empty() {
+            length(&self.next, ways).at("next")?;
+        }
+        each(&self.next, |next| index(*next, nodes, "nodes")).at("next")?;
+        share(self.visits).at("visits")?;
+        length(&self.gone, self.next.len()).at("gone")?;
+        each(&self.gone, |gone| share(*gone)).at("gone")
     }
 }
 
@@ -450,10 +479,7 @@ impl NodeTable {
         sizes.action(&self.action).at("action")?;
         check_place(&self.place, matching, sizes.coordinates).at("place")?;
         optional(self.value).at("value")?;
-        if !(0.0..=1.0).contains(&self.visits) {
-            let message = format!("{} is no share of all steps", self.visits);
-            return Err(Fault::new(message)).at("visits");
-        }
+        share(self.visits).at("visits")?;
         each(&self.predecessors, |&(node, count)| {
             index(node, sizes.nodes, "nodes").item(0)?;
             number(count).item(1)?;
@@ -585,6 +611,13 @@ fn number(value: f64) -> Checked {
     Err(Fault::new(format!(
         "{value:e}, and no number may be larger than {LARGEST:e} in magnitude"
     )))
+}
+
+fn share(value: f64) -> Checked {
+    match (0.0..=1.0).contains(&value) {
+        true => Ok(()),
+        false => Err(Fault::new(format!("{value} is no share of all steps"))),
+    }
 }
 
 fn optional(value: Option<f64>) -> Checked {

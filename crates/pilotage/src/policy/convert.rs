@@ -1,12 +1,12 @@
-//! From an automaton to the tables of its file and back; nothing is lost either way.
+//! From a policy to the tables of its file and back; nothing is lost either way.
 
 use super::check::{At, Checked, Fault};
 use super::file::{
-    BeliefTable, CoordinateTable, Ends, FilterTable, LevelTable, MapTable, MemoryTable, NodeTable,
-    ObservedTable, PhaseTable, PolicyTable, RecallTable, Rows, SideTable, StartTable, StepTable,
-    StratumTable, SwitchTable, WallsTable,
+    BeliefTable, CoordinateTable, Ends, FilterTable, GraphNodeTable, GraphTable, LevelTable,
+    MapTable, MemoryTable, NodeTable, ObservedTable, PhaseTable, PolicyTable, RecallTable, Rows,
+    SideTable, StartTable, StepTable, StratumTable, SwitchTable, WallsTable,
 };
-use super::{Automaton, Coordinates, Node, Observed, Tree};
+use super::{Automaton, Coordinates, GraphNode, Node, Observed, PolicyGraph, Tree};
 use std::sync::Arc;
 
 use crate::belief::{Clusters, Codebook, Filter, Memory, Recall, Updater};
@@ -32,6 +32,46 @@ fn interval([low, high]: Ends) -> Interval {
         low.unwrap_or(f64::NEG_INFINITY),
         high.unwrap_or(f64::INFINITY),
     )
+}
+
+impl GraphTable {
+    /// The table of a graph, which may still not be fit to be read again.
+    pub(super) fn new(graph: &PolicyGraph) -> Self {
+        let node = |node: &GraphNode| GraphNodeTable {
+            action: node.action,
+            next: node.next.clone(),
+            visits: node.visits,
+            gone: node.gone.clone(),
+        };
+        Self {
+            problem: graph.problem.clone(),
+            fingerprint: graph.fingerprint,
+            solver: graph.solver.clone(),
+            planned_value: graph.planned_value,
+            actions: graph.actions.clone(),
+            signals: graph.signals.clone(),
+            nodes: graph.nodes.iter().map(node).collect(),
+        }
+    }
+
+    /// The graph that the table describes, which has been checked.
+    pub(super) fn graph(self) -> PolicyGraph {
+        let node = |node: GraphNodeTable| GraphNode {
+            action: node.action,
+            next: node.next,
+            visits: node.visits,
+            gone: node.gone,
+        };
+        PolicyGraph {
+            problem: self.problem,
+            fingerprint: self.fingerprint,
+            solver: self.solver,
+            actions: self.actions,
+            signals: self.signals,
+            planned_value: self.planned_value,
+            nodes: self.nodes.into_iter().map(node).collect(),
+        }
+    }
 }
 
 impl PolicyTable {

@@ -15,10 +15,11 @@ pub(super) type Rows = Vec<Vec<f64>>;
 
 /// JSON schema of policy files, for programs that read them and for people.
 pub fn schema() -> Schema {
-    schemars::schema_for!(File<PolicyTable>)
+    schemars::schema_for!(File<AnyTable>)
 }
 
-/// A policy for acting under uncertainty: a filter that keeps a belief, and a finite automaton that says what to do at it.
+/// A policy for acting under uncertainty: a filter that keeps a belief, and a finite automaton that says what to do at it; or a policy
+/// graph, which needs no belief.
 ///
 /// With n state variables and m sensor readings. Whatever refers to something by number counts from 0, in the order of the list that it
 /// refers to. A matrix is a list of its rows. No number is larger than 1e60 in magnitude.
@@ -39,7 +40,58 @@ pub(super) struct File<P> {
     pub policy: P,
 }
 
-/// The policy.
+/// A policy of either kind; the one with `signals` is a graph.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code, reason = "it describes what `policy` may be")]
+enum AnyTable {
+    Automaton(Box<PolicyTable>),
+    Graph(GraphTable),
+}
+
+/// A policy graph: nodes with an action each, and where to go on after every signal of a discrete sensor. It begins at the first node.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct GraphTable {
+    /// Name of the problem it was made for.
+    pub problem: String,
+    /// Fingerprint of that problem, which changes when anything changes that a policy depends on.
+    #[schemars(with = "String", regex(pattern = r"^v[0-9]+-[0-9a-f]{16}$"))]
+    pub fingerprint: Fingerprint,
+    /// Name of the solver that made it.
+    pub solver: String,
+    /// Return that the solver expects from the start over an episode, where it knows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub planned_value: Option<f64>,
+    /// Names of the actions.
+    #[schemars(length(min = 1))]
+    pub actions: Vec<String>,
+    /// Names of the signals.
+    #[schemars(length(min = 1))]
+    pub signals: Vec<String>,
+    /// The nodes, at least one. An episode begins at the first, and again whenever it begins again.
+    #[schemars(length(min = 1))]
+    pub nodes: Vec<GraphNodeTable>,
+}
+
+/// A node of a policy graph.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub(super) struct GraphNodeTable {
+    /// What to do.
+    pub action: usize,
+    /// The node to go on at after each signal, and last, after none. Default: the episode never goes on after the action; whoever goes on all
+    /// the same stays.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub next: Vec<usize>,
+    /// Share of all steps of an episode that are spent in it, from 0 to 1, where the model holds.
+    pub visits: f64,
+    /// Share of all steps after which each way of `next` is gone, from 0 to 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gone: Vec<f64>,
+}
+
+/// An automaton, and what keeps its belief.
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub(super) struct PolicyTable {

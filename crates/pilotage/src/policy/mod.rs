@@ -3,6 +3,9 @@
 //! A [`Policy`] is whatever says what to do at every belief. The one that people keep is the [`Automaton`]: [`Node`]s, each with a
 //! [`Place`] among the beliefs and an action, and the filter that keeps the belief. It is saved and read as JSON ([`Automaton::save`],
 //! [`Automaton::load`], [`schema`]). An [`AutomatonRunner`] runs it without allocating.
+//!
+//! A [`PolicyGraph`] is no [`Policy`] in this sense, as it needs no belief: signals of a discrete sensor lead from node to node. A
+//! [`GraphRunner`] runs it. Whichever a file holds is [`Saved`].
 
 mod automaton;
 mod builder;
@@ -11,8 +14,10 @@ mod components;
 mod convert;
 mod coordinates;
 mod file;
+mod graph;
 mod layout;
 mod runner;
+mod saved;
 mod store;
 mod tree;
 
@@ -20,7 +25,9 @@ pub use crate::files::{check_writable, write_whole};
 pub use automaton::{Automaton, Matching, Node, NodeId, Observed, Place};
 pub use coordinates::{Coordinates, MOST_COORDINATES};
 pub use file::schema;
+pub use graph::{Exit, GraphNode, GraphRunner, PolicyGraph};
 pub use runner::AutomatonRunner;
+pub use saved::Saved;
 pub(crate) use tree::{Asked, StratumFeatures};
 pub use tree::{Branch, Feature, Test, Tree};
 

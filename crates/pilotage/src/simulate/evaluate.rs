@@ -105,10 +105,13 @@ pub fn evaluate(
     })
 }
 
+/// Makes agents, each for a number of episodes.
+pub type Agents<'a, 'b> = dyn Fn() -> Box<dyn Agent + 'a> + Sync + 'b;
+
 /// Runs agents in the scenario's world, each made anew for a number of episodes. The same numbers for any number of threads.
-pub fn evaluate_agent<'a>(
+pub fn evaluate_agent(
     scenario: &Scenario,
-    agent: &(dyn Fn() -> Box<dyn Agent + 'a> + Sync),
+    agent: &Agents<'_, '_>,
     options: Options,
     observer: &dyn Progress,
 ) -> Evaluation {
@@ -124,12 +127,23 @@ pub fn compare(
     options: Options,
     observer: &dyn Progress,
 ) -> Difference {
+    let first = || -> Box<dyn Agent + '_> { Box::new(TrackingAgent::new(tracking, first)) };
+    let second = || -> Box<dyn Agent + '_> { Box::new(TrackingAgent::new(tracking, second)) };
+    compare_agents(scenario, &first, &second, options, observer)
+}
+
+/// The same for agents, whatever they keep.
+pub fn compare_agents(
+    scenario: &Scenario,
+    first: &Agents<'_, '_>,
+    second: &Agents<'_, '_>,
+    options: Options,
+    observer: &dyn Progress,
+) -> Difference {
     let mut difference = Moments::default();
     let runner = || {
-        let [mut first, mut second] = [first, second].map(|policy| {
-            let agent = Box::new(TrackingAgent::new(tracking, policy));
-            episodes(scenario, agent, options)
-        });
+        let mut first = episodes(scenario, first(), options);
+        let mut second = episodes(scenario, second(), options);
         Box::new(move |episode| first(episode).discounted - second(episode).discounted) as Runner<_>
     };
     run_all(

@@ -94,8 +94,8 @@ impl Agent for HandAgent<'_> {
         self.step += 1;
     }
 
-    fn belief(&self) -> &Belief {
-        self.tracker.belief()
+    fn belief(&self) -> Option<&Belief> {
+        Some(self.tracker.belief())
     }
 
     fn held(&self) -> Option<&Held> {

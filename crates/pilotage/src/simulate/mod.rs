@@ -1,7 +1,8 @@
 //! Running policies in worlds, and what they earn.
 //!
 //! [`evaluate`] runs a policy for many episodes of a scenario and gives an [`Evaluation`], each of its numbers an [`Estimate`] with a
-//! standard error; [`compare`] runs two of them through the same episodes; [`life`] asks how long it takes until one fails, and
+//! standard error; [`compare`] runs two of them through the same episodes; [`evaluate_agent`] and [`compare_agents`] do so for agents of any
+//! kind, such as the [`GraphRunner`](crate::policy::GraphRunner) of a policy graph; [`life`] asks how long it takes until one fails, and
 //! [`wake_up`] what becomes of an agent that is carried elsewhere.
 //!
 //! One episode is [`run_episode`]: an [`Agent`], such as the [`TrackingAgent`] of a tracker and a policy, in a
@@ -17,7 +18,10 @@ pub mod wake_up;
 pub use agent::{Agent, TrackingAgent};
 pub use estimate::Estimate;
 pub(crate) use evaluate::summarise;
-pub use evaluate::{Difference, Evaluation, Lost, Options, compare, evaluate, evaluate_agent};
+pub use evaluate::{
+    Agents, Difference, Evaluation, Lost, Options, compare, compare_agents, evaluate,
+    evaluate_agent,
+};
 pub use hand::{HandAgent, Told};
 pub use life::{Life, LifeOptions, Run, life};
 
@@ -107,7 +111,7 @@ pub fn run_episode(
             episode.failed = step.failed;
             break;
         }
-        if !is_kept(&agent.belief().mean) {
+        if agent.belief().is_some_and(|belief| !is_kept(&belief.mean)) {
             episode.lost = true;
             break;
         }

@@ -165,8 +165,8 @@ impl Agent for WakeUpAgent<'_> {
         }
     }
 
-    fn belief(&self) -> &Belief {
-        self.valid()
+    fn belief(&self) -> Option<&Belief> {
+        Some(self.valid())
     }
 
     fn hypotheses(&self) -> Vec<(f64, &Belief)> {

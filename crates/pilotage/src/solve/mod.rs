@@ -8,6 +8,7 @@
 //!
 //! | solver | what it does |
 //! |---|---|
+//! | [`PointBased`] | backs up values of policies at beliefs on cells; policy graphs for discrete sensors |
 //! | [`CodebookPlanner`] | value iteration on strata and means of beliefs of any kind |
 //! | [`ValueIteration`] | value iteration on levels and means, for models of at most three variables |
 //! | [`Kbvi`] | the thesis' search of action sequences that are fixed in advance |
@@ -67,5 +68,5 @@ pub use registry::{Entry, Registry};
 pub use run::{learn, plan, solve};
 pub use settings::{SettingInfo, Settings};
 pub use solution::{Form, Learning, Line, Solution, Solved};
-pub use solver::{Found, Learner, Lesson, Plan, Planner, Problem, Request, Solver, Worlds};
+pub use solver::{Found, Learner, Lesson, Plan, Planner, Problem, Request, Size, Solver, Worlds};
 pub use value_iteration::ValueIteration;

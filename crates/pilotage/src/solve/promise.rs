@@ -64,6 +64,9 @@ impl Solution {
                     strata,
                     self.planned_value < Some(assumed.discounted.mean),
                 )],
+                None if self.graph().is_some() => {
+                    vec!["what is planned is so on cells, and these are coarse; more `cells` in [belief] come nearer".to_owned()]
+                }
                 None => reasons(&scenario.model),
             };
             remarks.push(match reasons.is_empty() {
@@ -95,17 +98,23 @@ impl Solution {
 }
 
 impl Solution {
-    /// What the scenario's rule of thumb earns on beliefs that are kept as those of this solution, but about all that the model says.
+    /// What the scenario's rule of thumb earns on beliefs that are kept as those of this solution, but about all that the model says, or, where
+    /// it keeps none, as the model asks.
     fn by_rule(
         &self,
         scenario: &Scenario,
         options: Options,
         observer: &dyn Progress,
     ) -> Result<Option<Evaluation>> {
-        let (Some(rule), Some(updater)) = (scenario.rule.as_ref(), self.updater()) else {
+        let Some(rule) = scenario.rule.as_ref() else {
             return Ok(None);
         };
-        let space = updater.whole(&scenario.model)?.space(&scenario.model);
+        let updater = match (&self.policy, self.updater()) {
+            (Solved::Graph(_), _) => Updater::of(&scenario.model)?,
+            (_, Some(updater)) => updater.whole(&scenario.model)?,
+            (_, None) => return Ok(None),
+        };
+        let space = updater.space(&scenario.model);
         let told = Told::of(space.as_ref());
         let keeper = space.updater();
         let agent = || -> Box<dyn Agent + '_> { Box::new(HandAgent::new(&keeper, rule, &told)) };
@@ -117,12 +126,12 @@ impl Solution {
         self.updater()?.codebook().map(Codebook::len)
     }
 
-    /// What keeps the belief, where it is not that of a free control.
+    /// What keeps the belief, where it keeps one.
     fn updater(&self) -> Option<&Updater> {
         match &self.policy {
             Solved::Automaton(automaton) => Some(&automaton.updater),
             Solved::Rule { updater, .. } => Some(updater),
-            Solved::Control(_) => None,
+            Solved::Graph(_) | Solved::Control(_) => None,
         }
     }
 }

@@ -51,7 +51,7 @@ pub fn decisions(
     length: usize,
     seed: u64,
 ) -> Vec<Vec<Decision>> {
-    let at = |agent: &dyn Agent| agent.belief().clone();
+    let at = |agent: &TrackingAgent<'_>| agent.believed().clone();
     recorded(space, (updater, policy), (episodes, length), seed, &at)
 }
 
@@ -61,7 +61,7 @@ pub(crate) fn recorded<At: Send>(
     (updater, policy): (&Updater, &dyn Policy),
     (episodes, length): (usize, usize),
     seed: u64,
-    at: &(dyn Fn(&dyn Agent) -> At + Sync),
+    at: &(dyn Fn(&TrackingAgent<'_>) -> At + Sync),
 ) -> Vec<Vec<Decision<At>>> {
     let length = length.min(MOST_DECISIONS / episodes.max(1));
     let model = space.model();
@@ -174,7 +174,7 @@ struct Judge<'a> {
 impl Judge<'_> {
     /// The belief of now, judged in full if the judge looks at beliefs in full.
     fn judged_now(&self, counts: f64) -> Judged {
-        let (belief, held) = (self.inner.belief(), self.inner.held());
+        let (belief, held) = (self.inner.believed(), self.inner.held());
         let in_full = held.and_then(|held| self.judge.values_in_full(held));
         let (values, value) = match in_full {
             Some(values) => {
@@ -226,7 +226,7 @@ impl Agent for Judge<'_> {
         self.inner.observe(action, reading);
     }
 
-    fn belief(&self) -> &Belief {
+    fn belief(&self) -> Option<&Belief> {
         self.inner.belief()
     }
 }
@@ -234,7 +234,7 @@ impl Agent for Judge<'_> {
 /// An agent that writes down its decisions.
 struct Recorder<'a, At> {
     inner: TrackingAgent<'a>,
-    at: &'a (dyn Fn(&dyn Agent) -> At + Sync),
+    at: &'a (dyn Fn(&TrackingAgent<'_>) -> At + Sync),
     sensed: Vec<f64>,
     decisions: Vec<Decision<At>>,
 }
@@ -261,7 +261,7 @@ impl<At: Send> Agent for Recorder<'_, At> {
         self.inner.observe(action, reading);
     }
 
-    fn belief(&self) -> &Belief {
+    fn belief(&self) -> Option<&Belief> {
         self.inner.belief()
     }
 }

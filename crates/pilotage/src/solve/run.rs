@@ -1,7 +1,9 @@
 //! One way to run any solver: what it finds is brought into the form asked for here, and nowhere else.
 
 use super::rollout::check_runs;
-use super::solver::{Found, Learner, Plan, Planner, Problem, Request, Solver, accepted};
+use super::solver::{
+    Found, Learner, Plan, Planner, Problem, Request, Solver, accepted, no_graph, refuse,
+};
 use super::{Form, Solution, Solved, compile};
 use crate::error::Result;
 use crate::model::Model;
@@ -38,12 +40,16 @@ pub fn plan(
     observer: &dyn Progress,
 ) -> Result<Solution> {
     check_runs("runs", request.runs)?;
+    request.size().check(request.form.has_size())?;
     let problem = Problem::new(model, request);
     let levels = planner.needs_levels() && model.is_linear();
     if levels {
         problem.mdp().check()?;
     }
     accepted(planner, model)?;
+    if request.form == Form::Graph {
+        planner.makes_graph(model)?;
+    }
     if levels && planner.makes_automaton(model) {
         problem.mdp().check_bounded()?;
     }
@@ -57,8 +63,15 @@ pub fn plan(
     let levels = match &policy {
         Found::Rule { space, .. } => space.strata(),
         Found::Automaton(_) | Found::Control(_) => problem.mdp().strata(),
+        Found::Graph(_) => 0,
     };
     let policy = match (policy, request.form) {
+        (Found::Graph(graph), Form::Graph) => Solved::Graph(graph),
+        (_, Form::Graph) => return Err(no_graph(planner.name(), model)),
+        (Found::Graph(_), _) => {
+            let reason = "what it finds is a policy graph alone; use the form graph";
+            return Err(refuse(planner.name(), model, reason));
+        }
         (Found::Control(controller), _) => Solved::Control(controller),
         (Found::Rule { policy, space }, Form::Grid) => Solved::Rule {
             policy,
@@ -106,6 +119,10 @@ pub fn learn(
 ) -> Result<Solution> {
     let model = &scenario.model;
     check_runs("runs", request.runs)?;
+    request.size().check(request.form.has_size())?;
+    if request.form == Form::Graph {
+        return Err(no_graph(learner.name(), model));
+    }
     let problem = Problem::new(model, request);
     let levels = model.is_linear();
     if levels {
@@ -120,10 +137,10 @@ pub fn learn(
     Ok(Solution {
         levels: lesson.automaton.levels.len(),
         policy: match request.form {
-            Form::Nearest | Form::Segments | Form::Tree => {
+            Form::Grid => asked_anew(&lesson.automaton),
+            Form::Nearest | Form::Segments | Form::Tree | Form::Graph => {
                 Solved::Automaton(annotated(lesson.automaton, &problem, request))
             }
-            Form::Grid => asked_anew(&lesson.automaton),
         },
         planned_value: None,
         policy_convergence_horizon: None,

@@ -4,10 +4,13 @@ use super::lqg::LqgController;
 use crate::belief::Updater;
 use crate::error::{Error, Result};
 use crate::model::suggest;
-use crate::policy::{Automaton, AutomatonRunner, Matching, Policy};
+use crate::policy::{Automaton, AutomatonRunner, GraphRunner, Matching, Policy, PolicyGraph};
 use crate::progress::Progress;
 use crate::scenario::Scenario;
-use crate::simulate::{Difference, Evaluation, Options, compare, evaluate};
+use crate::simulate::{
+    Agent, Difference, Evaluation, Options, TrackingAgent, compare, compare_agents, evaluate,
+    evaluate_agent,
+};
 
 /// Form of the policy a planner hands over. Learners hand over the form they learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -21,11 +24,19 @@ pub enum Form {
     Tree,
     /// The planner itself, asked at every belief: nothing is compiled.
     Grid,
+    /// A policy graph, which needs no belief, where the sensor is discrete.
+    Graph,
 }
 
 impl Form {
     /// All forms.
-    pub const ALL: [Self; 4] = [Self::Nearest, Self::Segments, Self::Tree, Self::Grid];
+    pub const ALL: [Self; 5] = [
+        Self::Nearest,
+        Self::Segments,
+        Self::Tree,
+        Self::Grid,
+        Self::Graph,
+    ];
 
     /// Its name, as on the command line.
     pub fn name(self) -> &'static str {
@@ -34,6 +45,7 @@ impl Form {
             Self::Segments => "segments",
             Self::Tree => "tree",
             Self::Grid => "grid",
+            Self::Graph => "graph",
         }
     }
 
@@ -50,10 +62,15 @@ impl Form {
         })
     }
 
-    /// How automata of this form are matched; nodes found on the way to a grid are points.
+    /// Whether it is said of it how small it is to be, as of a tree and a graph.
+    pub fn has_size(self) -> bool {
+        matches!(self, Self::Tree | Self::Graph)
+    }
+
+    /// How automata of this form are matched; nodes found on the way to something else are points.
     pub(super) fn matching(self) -> Matching {
         match self {
-            Self::Nearest | Self::Grid => Matching::Nearest,
+            Self::Nearest | Self::Grid | Self::Graph => Matching::Nearest,
             Self::Segments => Matching::Segments,
             Self::Tree => Matching::Tree,
         }
@@ -90,7 +107,7 @@ pub struct Solution {
     pub planned_value: Option<f64>,
     /// The horizon from which on the number of nodes no longer changes, where the solver has one (thesis 5.4).
     pub policy_convergence_horizon: Option<usize>,
-    /// Uncertainty levels of the belief.
+    /// Uncertainty levels, or strata, of the belief; 0 for a policy that needs none.
     pub levels: usize,
     /// Steps of experience used; `None` for planners.
     pub samples: Option<u64>,
@@ -108,6 +125,8 @@ pub struct Solution {
 pub enum Solved {
     /// A finite automaton, with its filter inside.
     Automaton(Automaton),
+    /// A policy graph, which needs no filter.
+    Graph(PolicyGraph),
     /// A feedback on the mean that gives a free control, with its filter inside.
     Control(LqgController),
     /// A rule that is asked at every belief, and the filter that keeps the belief.
@@ -124,12 +143,26 @@ impl Solution {
     pub fn automaton(&self) -> Option<&Automaton> {
         match &self.policy {
             Solved::Automaton(automaton) => Some(automaton),
-            Solved::Control(_) | Solved::Rule { .. } => None,
+            Solved::Graph(_) | Solved::Control(_) | Solved::Rule { .. } => None,
         }
     }
 
-    /// What compiling cost: the discounted return of the planner itself, solved as [`Form::Grid`], less that of this automaton of
-    /// it, over the same episodes. `None` where this is no automaton, or the other no rule.
+    /// The policy graph, where it is one.
+    pub fn graph(&self) -> Option<&PolicyGraph> {
+        match &self.policy {
+            Solved::Graph(graph) => Some(graph),
+            Solved::Automaton(_) | Solved::Control(_) | Solved::Rule { .. } => None,
+        }
+    }
+
+    /// Number of nodes, where it has some.
+    pub fn nodes(&self) -> Option<usize> {
+        let graph = self.graph().map(|graph| graph.nodes.len());
+        graph.or_else(|| self.automaton().map(|automaton| automaton.nodes.len()))
+    }
+
+    /// What compiling cost: the discounted return of the planner itself, solved as [`Form::Grid`], less that of this automaton or graph of
+    /// it, over the same episodes. `None` where this is neither, or the other no rule.
     pub fn value_lost(
         &self,
         planner: &Self,
@@ -140,11 +173,25 @@ impl Solution {
         let Solved::Rule { policy, updater } = &planner.policy else {
             return None;
         };
-        let compiled = AutomatonRunner::new(self.automaton()?);
-        let (planner, compiled): (&dyn Policy, &dyn Policy) = (policy.as_ref(), &compiled);
-        Some(compare(
-            scenario, updater, planner, compiled, options, observer,
-        ))
+        let planner: &dyn Policy = policy.as_ref();
+        match &self.policy {
+            Solved::Automaton(automaton) => {
+                let compiled = AutomatonRunner::new(automaton);
+                let compiled: &dyn Policy = &compiled;
+                Some(compare(
+                    scenario, updater, planner, compiled, options, observer,
+                ))
+            }
+            Solved::Graph(graph) => {
+                let planner =
+                    || -> Box<dyn Agent + '_> { Box::new(TrackingAgent::new(updater, planner)) };
+                let compiled = || -> Box<dyn Agent> { Box::new(GraphRunner::new(graph)) };
+                Some(compare_agents(
+                    scenario, &planner, &compiled, options, observer,
+                ))
+            }
+            Solved::Control(_) | Solved::Rule { .. } => None,
+        }
     }
 
     /// Runs the policy in the scenario's world, by the standard of [`crate::simulate`].
@@ -161,6 +208,10 @@ impl Solution {
             Solved::Automaton(automaton) => {
                 let controller = AutomatonRunner::new(automaton);
                 evaluate(scenario, &automaton.updater, &controller, options, observer)
+            }
+            Solved::Graph(graph) => {
+                let agent = || -> Box<dyn Agent> { Box::new(GraphRunner::new(graph)) };
+                evaluate_agent(scenario, &agent, options, observer)
             }
             Solved::Control(controller) => controller.evaluate(scenario, options, observer)?,
             Solved::Rule { policy, updater } => {

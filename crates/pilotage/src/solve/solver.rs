@@ -8,7 +8,7 @@ use super::{Form, Learning, refusals};
 use crate::belief::{BeliefMdp, BeliefSpace};
 use crate::error::{Error, Result};
 use crate::model::{Model, TrackerKind};
-use crate::policy::{Automaton, Policy};
+use crate::policy::{Automaton, Policy, PolicyGraph};
 use crate::progress::Progress;
 use crate::world::World;
 
@@ -44,6 +44,14 @@ pub trait Planner: Send + Sync {
     fn makes_automaton(&self, model: &Model) -> bool {
         let _ = model;
         true
+    }
+
+    /// Whether it finds a policy graph for a model that it accepts, where the form asked for is [`Form::Graph`].
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] with the reason, and what would do.
+    fn makes_graph(&self, model: &Model) -> Result<()> {
+        Err(no_graph(self.name(), model))
     }
 }
 
@@ -146,6 +154,18 @@ impl Solver {
             Self::Learner(_) => true,
         }
     }
+
+    /// Whether what it finds for a model that it accepts can have a form: any but a policy graph can.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] with the reason, and what would do.
+    pub fn gives(&self, form: Form, model: &Model) -> Result<()> {
+        match self {
+            _ if form != Form::Graph => Ok(()),
+            Self::Planner(planner) => planner.makes_graph(model),
+            Self::Learner(learner) => Err(no_graph(learner.name(), model)),
+        }
+    }
 }
 
 /// What is asked of a solver, whichever it is.
@@ -155,9 +175,9 @@ pub struct Request {
     pub form: Form,
     /// Seed of every random number.
     pub seed: u64,
-    /// Most nodes of an automaton in the form of a tree, at least 1; `None` for as many as it takes.
+    /// Most nodes of a tree or graph, at least 1; `None` for as many as it takes.
     pub nodes: Option<usize>,
-    /// Return that such an automaton may lose, as a share of that of the plan; `None` for 1 %.
+    /// Return that such a policy may lose, as a share of that of the plan; `None` for 1 %.
     pub loss: Option<f64>,
     /// Episodes run to see which beliefs a policy meets, 1 to a million.
     pub runs: usize,
@@ -179,6 +199,14 @@ impl Default for Request {
 }
 
 impl Request {
+    /// How large the policy may be.
+    pub(super) fn size(&self) -> Size {
+        Size {
+            nodes: self.nodes,
+            loss: self.loss,
+        }
+    }
+
     /// A policy in this form, and everything else by default.
     pub fn form(form: Form) -> Self {
         Self {
@@ -194,7 +222,51 @@ pub struct Problem {
     model: Model,
     mdp: OnceLock<BeliefMdp>,
     form: Form,
+    size: Size,
     seed: u64,
+}
+
+/// How large a tree or graph may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Size {
+    /// Most nodes, at least 1; `None` for as many as it takes.
+    pub nodes: Option<usize>,
+    /// Share of the return of the plan that it may lose, at least 0; `None` for 1 %.
+    pub loss: Option<f64>,
+}
+
+/// Share of the plan's return that a tree or graph may lose, unless it is said.
+const LOSS: f64 = 0.01;
+
+impl Size {
+    /// Share of the return of the plan that may be lost.
+    pub(super) fn loss(self) -> f64 {
+        self.loss.unwrap_or(LOSS)
+    }
+
+    /// Whether it can be, and is said of a form that has a size.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(super) fn check(self, has_size: bool) -> Result<()> {
+        let fail = |setting, value: String, range| {
+            Err(Error::Setting {
+                setting,
+                value,
+                range,
+            })
+        };
+        const ALONE: &str = "for the forms tree and graph alone";
+        match (self.nodes, self.loss) {
+            (Some(nodes), _) if nodes == 0 => fail("nodes", nodes.to_string(), "at least 1"),
+            (_, Some(loss)) if loss < 0.0 || loss.is_nan() => {
+                fail("loss", loss.to_string(), "at least 0")
+            }
+            (Some(nodes), _) if !has_size => fail("nodes", nodes.to_string(), ALONE),
+            (_, Some(loss)) if !has_size => fail("loss", loss.to_string(), ALONE),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl Problem {
@@ -204,6 +276,7 @@ impl Problem {
             model: model.clone(),
             mdp: OnceLock::new(),
             form: request.form,
+            size: request.size(),
             seed: request.seed,
         }
     }
@@ -222,6 +295,11 @@ impl Problem {
     /// Form in which the policy is wanted. A planner may hand over any; it is brought into this form afterwards.
     pub fn form(&self) -> Form {
         self.form
+    }
+
+    /// How large a policy graph may be; trees are grown afterwards.
+    pub fn size(&self) -> Size {
+        self.size
     }
 
     /// Seed of every random number.
@@ -257,6 +335,8 @@ pub enum Found {
     },
     /// An automaton.
     Automaton(Automaton),
+    /// A policy graph, for those who asked for one.
+    Graph(PolicyGraph),
     /// A feedback on the mean that gives a free control.
     Control(LqgController),
 }
@@ -278,6 +358,14 @@ impl Plan {
         Self {
             value: automaton.planned_value,
             ..Self::of(Found::Automaton(automaton))
+        }
+    }
+
+    /// A policy graph, with what it says that it is worth.
+    pub fn graph(graph: PolicyGraph) -> Self {
+        Self {
+            value: graph.planned_value,
+            ..Self::of(Found::Graph(graph))
         }
     }
 
@@ -325,6 +413,19 @@ pub(super) fn refuse(solver: &'static str, model: &Model, reason: impl Into<Stri
         model: model.name.clone(),
         reason: reason.into(),
     }
+}
+
+/// What is said where there is no policy graph.
+pub(super) fn no_graph(solver: &'static str, model: &Model) -> Error {
+    let reason = match model.laws.symbols.is_empty() {
+        true => {
+            "a policy graph needs a discrete sensor (`symbols` in [sensor]), and it has none; use another form, such as tree"
+        }
+        false => {
+            "this solver finds no policy graph; use point-based, or another form, such as tree"
+        }
+    };
+    refuse(solver, model, reason)
 }
 
 /// Refuses a model for the reason, if there is one.

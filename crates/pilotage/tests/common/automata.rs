@@ -2,7 +2,9 @@
 
 use pilotage::belief::{BeliefMdp, Clusters, Recall};
 use pilotage::model::Model;
-use pilotage::policy::{Automaton, Coordinates, Matching, Node, Observed, Place};
+use pilotage::policy::{
+    Automaton, Coordinates, GraphNode, Matching, Node, Observed, Place, PolicyGraph,
+};
 use pilotage::scenario::{self, Scenario};
 use proptest::prelude::*;
 use serde_json::Value;
@@ -241,4 +243,26 @@ pub fn checksum(policy: &str) -> String {
 pub fn sealed(mut file: Value) -> String {
     file["checksum"] = checksum(&file["policy"].to_string()).into();
     file.to_string()
+}
+
+/// Policy graphs of any size, whose ways lead anywhere.
+pub fn any_graph() -> impl Strategy<Value = PolicyGraph> {
+    let model = built_in("light-dark-binary");
+    let ways = model.laws.symbols.len() + 1;
+    let actions = model.actions.len();
+    (1usize..12).prop_flat_map(move |nodes| {
+        let next = proptest::collection::vec(0..nodes, ways);
+        let next = prop_oneof![4 => next, 1 => Just(Vec::new())];
+        let node = (0..actions, next, 0.0..=1.0).prop_map(|(action, next, visits)| GraphNode {
+            gone: next.iter().map(|_| 0.25 * visits).collect(),
+            action,
+            next,
+            visits,
+        });
+        let model = model.clone();
+        proptest::collection::vec(node, nodes).prop_map(move |nodes| PolicyGraph {
+            nodes,
+            ..PolicyGraph::new(&model, "any")
+        })
+    })
 }

@@ -8,9 +8,11 @@ mod mutate;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use pilotage::belief::BeliefMdp;
+use pilotage::belief::{BeliefMdp, Reading};
 use pilotage::model::Model;
-use pilotage::policy::{Automaton, AutomatonRunner, Coordinates, Matching};
+use pilotage::policy::{
+    Automaton, AutomatonRunner, Coordinates, GraphNode, GraphRunner, Matching, PolicyGraph, Saved,
+};
 use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{TrackingAgent, run_episode};
@@ -195,19 +197,61 @@ fn policies() -> Reader {
     let corridor = built_in("corridor-blind");
     Reader {
         name: "policies",
-        corpus: automata.iter().map(text).collect(),
+        corpus: automata.iter().map(text).chain([graph()]).collect(),
         read: Box::new(move |bytes| {
-            let Ok(automaton) = Automaton::from_json(&sealed_policy(bytes), "input") else {
+            let Ok(saved) = Saved::from_json(&sealed_policy(bytes), "input") else {
                 return false;
             };
-            use_policy(&automaton);
-            let _ = automaton.check_problem(&corridor, "input");
-            let _ = automaton.check_world(&corridor, "input");
-            let again = automaton.to_json().expect("what was read can be written");
-            Automaton::from_json(&again, "again").expect("and read again");
+            let _ = saved.check_problem(&corridor, "input");
+            let _ = saved.check_world(&corridor, "input");
+            let again = match &saved {
+                Saved::Automaton(automaton) => {
+                    use_policy(automaton);
+                    automaton.to_json()
+                }
+                Saved::Graph(graph) => {
+                    use_graph(graph);
+                    graph.to_json()
+                }
+            };
+            let again = again.expect("what was read can be written");
+            Saved::from_json(&again, "again").expect("and read again");
             true
         }),
     }
+}
+
+/// The file of a small policy graph.
+fn graph() -> Vec<u8> {
+    let node = |action, next: &[usize]| GraphNode {
+        action,
+        next: next.to_vec(),
+        visits: 0.25,
+        gone: vec![0.125; next.len()],
+    };
+    let graph = PolicyGraph {
+        nodes: vec![
+            node(1, &[1, 0, 0]),
+            node(2, &[2, 0, 1]),
+            node(2, &[3, 3, 2]),
+            node(0, &[]),
+        ],
+        ..PolicyGraph::new(&built_in("light-dark-binary"), "by hand")
+    };
+    graph.to_json().expect("a policy").into_bytes()
+}
+
+/// Goes along every way, and after signals that no sensor knows.
+fn use_graph(graph: &PolicyGraph) {
+    let mut runner = GraphRunner::new(graph);
+    let _ = graph.in_words();
+    for signal in [0, 1, 0, 2, 3, u32::MAX, 1, 0, 0] {
+        let (node, action) = runner.decide();
+        assert!(node < graph.nodes.len() && action < graph.actions.len());
+        runner.observe(Reading::Symbol(signal));
+    }
+    runner.observe(Reading::Nothing);
+    runner.decide();
 }
 
 /// Acts on what hardly any sensor says.

@@ -6,14 +6,14 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::belief::BeliefSpace;
 use crate::policy::{Automaton, NodeId, Observed};
-use crate::simulate::Agent;
+use crate::simulate::{Agent, TrackingAgent};
 use crate::solve::rollout;
 
 /// Runs the automaton in the model and writes predecessors, observations and visits into its nodes.
 pub fn annotate(automaton: &mut Automaton, space: &dyn BeliefSpace, episodes: usize, seed: u64) {
     let model = space.model();
     let m = model.observation_dim();
-    let at = |agent: &dyn Agent| agent.node(automaton);
+    let at = |agent: &TrackingAgent<'_>| agent.node(automaton);
     let runs = rollout::recorded(
         space,
         (&automaton.updater, automaton),

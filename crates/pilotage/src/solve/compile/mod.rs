@@ -19,6 +19,7 @@ use crate::belief::{Belief, BeliefSpace, StratumId};
 use crate::error::{Error, Result};
 use crate::model::{ActionId, ModeId};
 use crate::policy::{Automaton, Matching, Policy};
+use crate::solve::Size;
 use crate::solve::rollout::{self, Decision, check_runs};
 
 /// Settings of the compiler.
@@ -51,37 +52,8 @@ impl Default for Settings {
     }
 }
 
-/// Share of the policy's return that a tree may lose, unless it is said.
-const LOSS: f64 = 0.01;
-
 /// Most nodes of a tree, unless it is said.
 const MOST_NODES: usize = 1000;
-
-impl Settings {
-    /// How small it may be is said of trees alone.
-    fn check_size(&self) -> Result<()> {
-        let fail = |setting, value: String, range| {
-            Err(Error::Setting {
-                setting,
-                value,
-                range,
-            })
-        };
-        match (self.nodes, self.loss) {
-            (Some(nodes), _) if nodes == 0 => fail("nodes", nodes.to_string(), "at least 1"),
-            (_, Some(loss)) if loss < 0.0 || loss.is_nan() => {
-                fail("loss", loss.to_string(), "at least 0")
-            }
-            (Some(nodes), _) if self.matching != Matching::Tree => {
-                fail("nodes", nodes.to_string(), "for the form tree alone")
-            }
-            (_, Some(loss)) if self.matching != Matching::Tree => {
-                fail("loss", loss.to_string(), "for the form tree alone")
-            }
-            _ => Ok(()),
-        }
-    }
-}
 
 /// Decisions a policy took at neighbouring levels in one mode, to be served by the same nodes.
 struct Band {
@@ -143,14 +115,18 @@ pub fn compile(
             range: "at least 0 and below 1",
         });
     }
-    settings.check_size()?;
+    let size = Size {
+        nodes: settings.nodes,
+        loss: settings.loss,
+    };
+    size.check(settings.matching == Matching::Tree)?;
     let model = space.model();
     if settings.matching == Matching::Tree {
         let mut automaton = Automaton::new(space, solver, Matching::Tree);
         automaton.planned_value = policy.value(space.start());
         let size = trees::Size {
-            nodes: settings.nodes.unwrap_or(MOST_NODES),
-            loss: settings.loss.unwrap_or(LOSS),
+            nodes: size.nodes.unwrap_or(MOST_NODES),
+            loss: size.loss(),
         };
         let runs = (settings.episodes, settings.seed);
         trees::grow(&mut automaton, policy, space, size, runs);

@@ -97,7 +97,7 @@ impl Planner for Kbvi {
         let settings = generate::Settings {
             matching: match problem.form() {
                 Form::Segments => Matching::Segments,
-                Form::Nearest | Form::Tree | Form::Grid => Matching::Nearest,
+                Form::Nearest | Form::Tree | Form::Grid | Form::Graph => Matching::Nearest,
             },
             search,
             last_horizon: self.last_horizon,
@@ -109,7 +109,9 @@ impl Planner for Kbvi {
         let generated = generate::generate(problem.mdp(), &settings, observer)?;
         let value = generated.automaton.planned_value;
         let policy = match problem.form() {
-            Form::Nearest | Form::Segments | Form::Tree => Found::Automaton(generated.automaton),
+            Form::Nearest | Form::Segments | Form::Tree | Form::Graph => {
+                Found::Automaton(generated.automaton)
+            }
             Form::Grid => {
                 let last = generated.history.last();
                 let horizon = last.map_or(search.horizon, |last| last.0);

@@ -138,8 +138,8 @@ impl Agent for Visitor {
         self.controller.observe(action, reading);
     }
 
-    fn belief(&self) -> &Belief {
-        self.controller.belief()
+    fn belief(&self) -> Option<&Belief> {
+        Some(self.controller.belief())
     }
 }
 

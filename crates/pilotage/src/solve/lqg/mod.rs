@@ -83,7 +83,7 @@ impl Planner for Lqg {
         // Two nodes say it exactly where there are two actions.
         let nodes = match problem.form() {
             Form::Nearest => policy.automaton(problem.mdp()),
-            Form::Segments | Form::Tree | Form::Grid => None,
+            Form::Segments | Form::Tree | Form::Grid | Form::Graph => None,
         };
         Ok(match nodes {
             Some(automaton) => Plan::automaton(automaton),

@@ -14,11 +14,14 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+use super::SOLVER;
 use super::backup::Backup;
+use super::occupied::shares;
 use super::point::{ValueVector, VectorSet};
 use crate::belief::Keeping;
-use crate::model::ActionId;
+use crate::model::{ActionId, Model};
 use crate::parallel;
+use crate::policy::{GraphNode, PolicyGraph};
 
 /// Values of nodes are iterated until they change by less than this share of the largest, or so often.
 const CLOSE: f64 = 1e-8;
@@ -26,22 +29,22 @@ const SWEEPS: usize = 20_000;
 
 /// A node of a policy.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PolicyNode {
+pub(super) struct Node {
     /// What to do.
-    pub action: ActionId,
+    pub(super) action: ActionId,
     /// Where to go after each signal, and last, after none. Empty if the episode never goes on.
-    pub next: Vec<usize>,
+    pub(super) next: Vec<usize>,
 }
 
-/// A policy that needs no belief. It begins, and after a restart goes on, at the first node.
+/// A policy that needs no belief, with what it is worth. It begins, and after a restart goes on, at the first node.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PolicyGraph {
+pub(super) struct Graph {
     /// The nodes, all of which can be reached from the first.
-    pub nodes: Vec<PolicyNode>,
-    /// What each node earns from every mode and cell.
-    pub values: Vec<Vec<f64>>,
+    pub(super) nodes: Vec<Node>,
+    /// What each node earns from every mode and cell, without end.
+    pub(super) values: Vec<Vec<f64>>,
     /// What it earns from the start.
-    pub value: f64,
+    pub(super) value: f64,
 }
 
 /// What it takes to value graphs.
@@ -50,7 +53,7 @@ pub(super) struct Grapher<'a> {
     /// By action: how likely each signal is, by mode and cell; the last row is that of none.
     pub(super) likely: Vec<DMatrix<f64>>,
     /// By action, whether the episode may go on.
-    goes_on: Vec<bool>,
+    pub(super) goes_on: Vec<bool>,
 }
 
 impl<'a> Grapher<'a> {
@@ -69,7 +72,7 @@ impl<'a> Grapher<'a> {
     }
 
     /// The graph that the best vector of the start stands for.
-    pub(super) fn of(&self, set: &VectorSet) -> PolicyGraph {
+    pub(super) fn of(&self, set: &VectorSet) -> Graph {
         let best = set.best(&self.backup.start).0;
         let root = set.vectors[best].clone();
         let mut numbers: HashMap<*const ValueVector, usize> = HashMap::new();
@@ -89,14 +92,15 @@ impl<'a> Grapher<'a> {
             let action = vector.action;
             let signals = self.likely[action].nrows();
             let next = match &vector.next {
-                Some(next) => next
-                    .iter()
-                    .map(|next| numbers[&Arc::as_ptr(next)])
-                    .collect(),
-                None if self.goes_on[action] => vec![index; signals],
-                None => Vec::new(),
+                _ if !self.goes_on[action] => Vec::new(),
+                // Where a vector knows of nothing that comes after it, others may: they do the same again.
+                Some(next) if !next.is_empty() => {
+                    let next = next.iter();
+                    next.map(|next| numbers[&Arc::as_ptr(next)]).collect()
+                }
+                _ => vec![index; signals],
             };
-            PolicyNode { action, next }
+            Node { action, next }
         };
         let nodes = found.iter().enumerate().map(node).collect();
         let values = found.iter().map(|vector| vector.values.clone()).collect();
@@ -104,7 +108,7 @@ impl<'a> Grapher<'a> {
     }
 
     /// A graph with its values, iterated from others.
-    pub(super) fn valued(&self, nodes: Vec<PolicyNode>, mut values: Vec<Vec<f64>>) -> PolicyGraph {
+    pub(super) fn valued(&self, nodes: Vec<Node>, mut values: Vec<Vec<f64>>) -> Graph {
         let discount = self.backup.discount;
         for _ in 0..SWEEPS {
             let start = self.backup.start.expected(&values[0]);
@@ -117,15 +121,46 @@ impl<'a> Grapher<'a> {
                 break;
             }
         }
-        PolicyGraph {
+        Graph {
             value: self.backup.start.expected(&values[0]),
             nodes,
             values,
         }
     }
 
+    /// The graph as it is kept: what it earns in an episode, and what of it is met there.
+    pub(super) fn told(&self, model: &Model, graph: &Graph) -> PolicyGraph {
+        let length = model.episode.length;
+        let shares = shares(self, graph, length);
+        let ways = shares.visits.into_iter().zip(shares.gone);
+        let nodes = graph.nodes.iter().zip(ways);
+        let nodes = nodes.map(|(node, (visits, gone))| GraphNode {
+            action: node.action,
+            next: node.next.clone(),
+            visits,
+            gone,
+        });
+        PolicyGraph {
+            planned_value: Some(self.earned(&graph.nodes, length)),
+            nodes: nodes.collect(),
+            ..PolicyGraph::new(model, SOLVER)
+        }
+    }
+
+    /// What a graph earns from the start in an episode of so many steps.
+    pub(super) fn earned(&self, nodes: &[Node], length: usize) -> f64 {
+        let mut values = vec![vec![0.0; self.backup.keeping.states()]; nodes.len()];
+        for _ in 0..length {
+            let start = self.backup.start.expected(&values[0]);
+            values = parallel::map(nodes.len(), |node| {
+                self.values(&nodes[node], &values, start)
+            });
+        }
+        self.backup.start.expected(&values[0])
+    }
+
     /// What a node is worth where others are worth `values`.
-    fn values(&self, node: &PolicyNode, values: &[Vec<f64>], start: f64) -> Vec<f64> {
+    fn values(&self, node: &Node, values: &[Vec<f64>], start: f64) -> Vec<f64> {
         let likely = &self.likely[node.action];
         let mut later = vec![0.0; likely.ncols()];
         for (signal, next) in node.next.iter().enumerate() {
@@ -147,7 +182,7 @@ fn change(old: &[Vec<f64>], new: &[Vec<f64>]) -> (f64, f64) {
 }
 
 /// Takes nodes that do the same for one, again and again.
-pub(super) fn merged(mut graph: PolicyGraph) -> PolicyGraph {
+pub(super) fn merged(mut graph: Graph) -> Graph {
     loop {
         let mut known: BTreeMap<(ActionId, Vec<usize>), usize> = BTreeMap::new();
         let becomes: Vec<usize> = graph
@@ -168,13 +203,13 @@ pub(super) fn merged(mut graph: PolicyGraph) -> PolicyGraph {
 }
 
 /// The graph whose ways lead to other nodes, without those that are no longer reached.
-fn redirected(graph: PolicyGraph, becomes: &[usize]) -> PolicyGraph {
+fn redirected(graph: Graph, becomes: &[usize]) -> Graph {
     let mut nodes = graph.nodes;
     for next in nodes.iter_mut().flat_map(|node| &mut node.next) {
         *next = becomes[*next];
     }
     let (nodes, values) = reached(&nodes, &graph.values, becomes[0]);
-    PolicyGraph {
+    Graph {
         nodes,
         values,
         value: graph.value,
@@ -183,10 +218,10 @@ fn redirected(graph: PolicyGraph, becomes: &[usize]) -> PolicyGraph {
 
 /// The nodes that are reached from one of them, which comes first, with their values.
 pub(super) fn reached(
-    nodes: &[PolicyNode],
+    nodes: &[Node],
     values: &[Vec<f64>],
     first: usize,
-) -> (Vec<PolicyNode>, Vec<Vec<f64>>) {
+) -> (Vec<Node>, Vec<Vec<f64>>) {
     let mut order = vec![first];
     let mut numbers = BTreeMap::from([(first, 0)]);
     let mut asked = 0;
@@ -199,7 +234,7 @@ pub(super) fn reached(
         }
         asked += 1;
     }
-    let node = |index: &usize| PolicyNode {
+    let node = |index: &usize| Node {
         action: nodes[*index].action,
         next: nodes[*index]
             .next

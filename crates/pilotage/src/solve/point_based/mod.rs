@@ -14,12 +14,15 @@
 mod backup;
 mod graph;
 mod improve;
+mod occupied;
 mod point;
 mod policy;
 mod shrink;
 mod signals;
+mod size;
 #[cfg(test)]
 mod tests;
+mod tune;
 mod walk;
 
 use std::sync::Arc;
@@ -27,13 +30,13 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use graph::{PolicyGraph, PolicyNode};
 pub use point::ValueVector;
 pub use policy::PointBasedPolicy;
 
+use super::Form;
 use super::refusals;
 use super::settings::{PAIRED, Settings, ensure, ensure_count};
-use super::solver::{Found, Plan, Planner, Problem, refuse, refuse_if};
+use super::solver::{Found, Plan, Planner, Problem, no_graph, refuse, refuse_if};
 use crate::belief::{CellsKeeping, Codebook, Coded, CodedSpace, Keeping, Moments, Updater};
 use crate::error::Result;
 use crate::model::{Model, TrackerKind};
@@ -229,9 +232,24 @@ impl Planner for PointBased {
         false
     }
 
+    fn makes_graph(&self, model: &Model) -> Result<()> {
+        match model.laws.symbols.is_empty() {
+            true => Err(no_graph(SOLVER, model)),
+            false => Ok(()),
+        }
+    }
+
     fn plan(&self, problem: &Problem, observer: &dyn Progress) -> Result<Plan> {
         let model = problem.model();
         let found = solve(model, self, problem.seed(), observer)?;
+        if problem.form() == Form::Graph {
+            let graph = found.policy.graph(model, problem.size(), observer);
+            let graph = graph.ok_or_else(|| no_graph(SOLVER, model))?;
+            return Ok(Plan {
+                converged: found.converged,
+                ..Plan::graph(graph)
+            });
+        }
         let codebook = Arc::new(found.strata);
         let keeping = Arc::clone(&found.policy.backup.keeping);
         let updater = Updater::Cells(Coded::new(model, keeping, Arc::clone(&codebook)));

@@ -5,13 +5,14 @@
 use std::sync::Arc;
 
 use super::backup::Backup;
-use super::graph::{self, Grapher, PolicyGraph};
+use super::graph::{self, Grapher};
 use super::point::{Point, ValueVector, VectorSet};
-use super::shrink;
+use super::{occupied, size};
 use crate::belief::{Belief, Cells, CellsKeeping, Codebook, Held, Keeping, Moments};
-use crate::model::ActionId;
-use crate::policy::Policy;
+use crate::model::{ActionId, Model};
+use crate::policy::{Policy, PolicyGraph};
 use crate::progress::Progress;
+use crate::solve::Size;
 
 /// What to do at a belief, by the vectors of a plan.
 #[derive(Debug, Clone)]
@@ -46,23 +47,22 @@ impl PointBasedPolicy {
         self.set.vectors[best].action
     }
 
-    /// The policy as a graph, if the sensor is discrete: what its nodes earn is its own value, beside that of the vectors. For fewer nodes
-    /// it may be worth less, by the share `spare` of its value.
-    pub fn graph(&self, spare: f64, observer: &dyn Progress) -> Option<PolicyGraph> {
+    /// The policy as a graph, where the sensor is discrete, of no more nodes than it may have, and else of as few as cost no more than it may
+    /// lose. What is planned is what the graph earns on the cells over an episode, exactly; it may be more than the vectors promise.
+    pub fn graph(
+        &self,
+        model: &Model,
+        limits: Size,
+        observer: &dyn Progress,
+    ) -> Option<PolicyGraph> {
         if !self.backup.keeping.is_discrete() {
             return None;
         }
         let grapher = Grapher::new(&self.backup);
-        let graph = graph::merged(grapher.of(&self.set));
-        let told = |graph: &PolicyGraph| {
-            let nodes = graph.nodes.len();
-            observer.status(&format!("{nodes} nodes, value {:.4}", graph.value));
-        };
-        told(&graph);
-        let floor = graph.value - spare * graph.value.abs();
-        let graph = shrink::shrunk(&grapher, graph, floor);
-        told(&graph);
-        Some(graph)
+        let whole = graph::merged(grapher.of(&self.set));
+        let found = size::sized(&grapher, whole, limits, observer);
+        let found = occupied::settled(&grapher, found, model.episode.length);
+        Some(grapher.told(model, &found))
     }
 
     /// What each action is worth by one look ahead at what may be sensed. It takes as long as a backup, and the best is never worth less

@@ -6,12 +6,9 @@
 
 use nalgebra::DMatrix;
 
-use super::graph::{Grapher, PolicyGraph, merged, reached};
+use super::graph::{Graph, Grapher, merged, reached};
+use super::occupied::met;
 use crate::belief::Keeping;
-
-/// Occupancies are followed until so little of them is left, or so many steps.
-const LEFT: f64 = 1e-6;
-const STEPS: usize = 5_000;
 
 /// Rounds in which nodes are spared, at most.
 const ROUNDS: usize = 60;
@@ -35,8 +32,15 @@ struct Worth {
     worth: DMatrix<f64>,
 }
 
+/// A graph with at most so many nodes, or with a share of those that it has, whatever that costs.
+pub(super) fn squeezed(grapher: &Grapher<'_>, graph: &Graph, most: usize, leaves: f64) -> Graph {
+    let nodes = graph.nodes.len();
+    let left = ((nodes as f64 * leaves) as usize).max(most);
+    Worth::new(grapher, graph).without(grapher, graph, nodes - left.min(nodes))
+}
+
 /// A graph with fewer nodes, worth at least `floor`.
-pub(super) fn shrunk(grapher: &Grapher<'_>, mut graph: PolicyGraph, floor: f64) -> PolicyGraph {
+pub(super) fn shrunk(grapher: &Grapher<'_>, mut graph: Graph, floor: f64) -> Graph {
     for _ in 0..ROUNDS {
         let worth = Worth::new(grapher, &graph);
         let mut spared = (graph.nodes.len() as f64 * AT_ONCE) as usize;
@@ -62,7 +66,7 @@ pub(super) fn shrunk(grapher: &Grapher<'_>, mut graph: PolicyGraph, floor: f64) 
 }
 
 impl Worth {
-    fn new(grapher: &Grapher<'_>, graph: &PolicyGraph) -> Self {
+    fn new(grapher: &Grapher<'_>, graph: &Graph) -> Self {
         let (ways, beliefs) = along(grapher, graph);
         let states = grapher.backup.keeping.states();
         let nodes = graph.nodes.len();
@@ -75,7 +79,7 @@ impl Worth {
     }
 
     /// The graph on which `spared` nodes of least worth are gone around.
-    fn without(&self, grapher: &Grapher<'_>, graph: &PolicyGraph, spared: usize) -> PolicyGraph {
+    fn without(&self, grapher: &Grapher<'_>, graph: &Graph, spared: usize) -> Graph {
         let chosen = self.chosen(graph, spared);
         let mut nodes = graph.nodes.clone();
         for (way, node) in self.ways.iter().zip(&chosen) {
@@ -87,7 +91,7 @@ impl Worth {
 
     /// Where each way leads once the nodes that are missed least are spared, one after the other. Ways to other nodes stay as they are, so
     /// that what those are worth stays true as well as can be.
-    fn chosen(&self, graph: &PolicyGraph, spared: usize) -> Vec<usize> {
+    fn chosen(&self, graph: &Graph, spared: usize) -> Vec<usize> {
         let (ways, nodes) = self.worth.shape();
         let mut kept = vec![true; nodes];
         let now = |way: &Way| graph.nodes[way.node].next[way.signal];
@@ -138,7 +142,7 @@ impl Worth {
 }
 
 /// The ways of a graph, and the beliefs with which they are gone, weighed by how often, discounted; last those of the start.
-fn along(grapher: &Grapher<'_>, graph: &PolicyGraph) -> (Vec<Way>, Vec<Vec<f64>>) {
+fn along(grapher: &Grapher<'_>, graph: &Graph) -> (Vec<Way>, Vec<Vec<f64>>) {
     let backup = grapher.backup;
     let keeping = &*backup.keeping;
     let states = keeping.states();
@@ -161,49 +165,4 @@ fn along(grapher: &Grapher<'_>, graph: &PolicyGraph) -> (Vec<Way>, Vec<Vec<f64>>
     let start = keeping.start();
     beliefs.push(start.probabilities().to_vec());
     (ways, beliefs)
-}
-
-/// How often each node is met, discounted, by mode and cell.
-fn met(grapher: &Grapher<'_>, graph: &PolicyGraph) -> Vec<Vec<f64>> {
-    let keeping = &*grapher.backup.keeping;
-    let states = keeping.states();
-    let start = keeping.start();
-    let mut now = vec![vec![0.0; states]; graph.nodes.len()];
-    now[0] = start.probabilities().to_vec();
-    let mut met = now.clone();
-    for _ in 0..STEPS {
-        let mut next = vec![vec![0.0; states]; graph.nodes.len()];
-        let mut moved = vec![0.0; states];
-        let mut restarted = 0.0;
-        for (node, masses) in graph.nodes.iter().zip(&now) {
-            if masses.iter().all(|mass| *mass == 0.0) {
-                continue;
-            }
-            moved.fill(0.0);
-            keeping.forward(node.action, masses, &mut moved);
-            let again = keeping.restarts(node.action).iter();
-            restarted += again
-                .zip(masses)
-                .map(|(share, mass)| share * mass)
-                .sum::<f64>();
-            for (signal, target) in node.next.iter().enumerate() {
-                let likely = grapher.likely[node.action].row(signal);
-                let arriving = moved.iter().zip(likely.iter());
-                for (to, (mass, likely)) in next[*target].iter_mut().zip(arriving) {
-                    *to += grapher.backup.discount * mass * likely;
-                }
-            }
-        }
-        for (to, mass) in next[0].iter_mut().zip(start.probabilities()) {
-            *to += grapher.backup.discount * restarted * mass;
-        }
-        for (sum, more) in met.iter_mut().flatten().zip(next.iter().flatten()) {
-            *sum += more;
-        }
-        now = next;
-        if now.iter().flatten().sum::<f64>() < LEFT {
-            break;
-        }
-    }
-    met
 }

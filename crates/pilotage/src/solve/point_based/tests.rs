@@ -1,9 +1,13 @@
+use super::graph::{Grapher, Node};
 use super::*;
 use crate::belief::{Cells, Keeping};
 use crate::model::Then;
 use crate::parallel;
+use crate::policy::{GraphRunner, PolicyGraph};
 use crate::progress::Silent;
 use crate::scenario::{Scenario, find, read};
+use crate::simulate::{Agent, Options, evaluate_agent};
+use crate::solve::Size;
 use crate::world::{Observation, ProblemWorld, Streams, World};
 
 /// Mean of the discounted returns that someone earns in a world, and its standard error. A mind is made for every episode.
@@ -38,8 +42,15 @@ fn earned<M>(
     (mean, spread.sqrt() / episodes as f64)
 }
 
-/// Share of its value that a graph may lose for fewer nodes.
-const SPARE: f64 = 2e-3;
+/// A graph may lose this share of its value for fewer nodes.
+const SIZE: Size = Size {
+    nodes: None,
+    loss: Some(2e-3),
+};
+
+fn graph_of(plan: &PointBasedPlan, scenario: &Scenario) -> Option<PolicyGraph> {
+    plan.policy.graph(&scenario.model, SIZE, &Silent)
+}
 
 /// What the vectors earn: the action of the best one, or that by one look ahead.
 fn earned_by_vectors(
@@ -69,23 +80,18 @@ fn earned_by_vectors(
 
 /// What the graph earns.
 fn earned_by_graph(scenario: &Scenario, graph: &PolicyGraph, episodes: usize) -> (f64, f64) {
-    earned(
-        scenario,
-        episodes,
-        || 0,
-        |node: &mut usize| graph.nodes[*node].action,
-        |node, _, reading| {
-            let next = &graph.nodes[*node].next;
-            *node = match reading {
-                None => 0,
-                Some(crate::belief::Reading::Symbol(symbol)) => next[symbol as usize],
-                Some(_) => next[next.len() - 1],
-            }
-        },
-    )
+    let agent = || -> Box<dyn Agent> { Box::new(GraphRunner::new(graph)) };
+    let options = Options { episodes, seed: 11 };
+    let earned = evaluate_agent(scenario, &agent, options, &Silent).discounted;
+    (earned.mean, earned.stderr)
 }
 
 fn tiger() -> Scenario {
+    tiger_heard(1.0)
+}
+
+/// The tiger, of which something is heard with this probability.
+fn tiger_heard(present: f64) -> Scenario {
     let text = r#"
         format = 1
         name = "tiger-on-cells"
@@ -106,6 +112,7 @@ fn tiger() -> Scenario {
         noise = [[0.0]]
         [sensor]
         symbols = { left = "0.85 - 0.7*door", right = "rest" }
+        present = PRESENT
         [actions]
         LISTEN = { u = [0.0] }
         LEFT = { u = [0.0], then = "restart" }
@@ -122,7 +129,7 @@ fn tiger() -> Scenario {
         [episode]
         length = 400
     "#;
-    read(text, "tiger").unwrap()
+    read(&text.replace("PRESENT", &format!("{present:?}")), "tiger").unwrap()
 }
 
 /// The value of the tiger problem over the difference of what was heard: 19.3714 (A. R. Cassandra's `tiger.95`).
@@ -156,16 +163,74 @@ fn the_tiger_problem_has_its_known_value() {
         ..PointBased::default()
     };
     let plan = solve(&scenario.model, &settings, 1, &Silent).unwrap();
-    let graph = &plan.policy.graph(SPARE, &Silent).unwrap();
+    let graph = &graph_of(&plan, &scenario).unwrap();
+    let value = graph.planned_value.unwrap();
     assert!((plan.value - exact).abs() < 1e-3, "{} {exact}", plan.value);
-    assert!(
-        (graph.value - exact).abs() < 1e-3,
-        "{} {exact}",
-        graph.value
-    );
+    assert!((value - exact).abs() < 1e-3, "{value} {exact}");
     assert_eq!(graph.nodes.len(), 5);
     let (mean, error) = earned_by_graph(&scenario, graph, 4000);
-    assert!((mean - graph.value).abs() < 3.0 * error, "{mean} {error}");
+    assert!((mean - value).abs() < 3.0 * error, "{mean} {error}");
+}
+
+/// Whoever listens until something is heard, and opens the other door, has `v = -1 + d (1 - p) v + d p (0.85 * 10 - 0.15 * 100 + d v)`, where
+/// `p` is how likely something is heard and `d` the discount.
+#[test]
+fn a_graph_made_by_hand_has_the_value_computed_by_hand() {
+    for p in [1.0, 0.8] {
+        let scenario = tiger_heard(p);
+        let model = &scenario.model;
+        let node = |action, next: &[usize]| Node {
+            action,
+            next: next.to_vec(),
+        };
+        let nodes = vec![node(0, &[2, 1, 0]), node(1, &[]), node(2, &[])];
+        let keeping = Arc::new(CellsKeeping::new(model).unwrap());
+        let backup = Backup::new(keeping, model.discount, 2);
+        let grapher = Grapher::new(&backup);
+        let values = vec![vec![0.0; backup.keeping.states()]; nodes.len()];
+        let graph = grapher.valued(nodes, values);
+
+        let d = model.discount;
+        let by_hand = (-1.0 - 6.5 * d * p) / (1.0 - d * (1.0 - p) - d * d * p);
+        let apart = |value: f64| (value - by_hand).abs();
+        assert!(apart(graph.value) < 1e-5, "{} {by_hand}", graph.value);
+        let in_an_episode = grapher.earned(&graph.nodes, model.episode.length);
+        assert!(apart(in_an_episode) < 1e-5, "{in_an_episode} {by_hand}");
+        let one_step = grapher.earned(&graph.nodes, 1);
+        assert!((one_step + 1.0).abs() < 1e-12);
+
+        // Every attempt is one opening, and 1 / p times listening.
+        let shares = occupied::shares(&grapher, &graph, model.episode.length);
+        let listening = 1.0 / (1.0 + p);
+        assert!((shares.visits[0] - listening).abs() < 2e-3);
+        assert!((shares.gone[0][2] - (1.0 - p) * listening).abs() < 2e-3);
+
+        let policy = grapher.told(model, &graph);
+        let (mean, error) = earned_by_graph(&scenario, &policy, 4000);
+        assert!(apart(mean) < 4.0 * error, "{mean} {error} {by_hand}");
+    }
+}
+
+/// What is tuned or made smaller is worth what is said, and no more nodes are kept than may be.
+#[test]
+fn a_graph_is_no_larger_than_it_may_be() {
+    let scenario = light(52, BINARY);
+    let plan = solve(&scenario.model, &quick(), 1, &Silent).unwrap();
+    let sized = |nodes| {
+        let size = Size { nodes, loss: None };
+        plan.policy.graph(&scenario.model, size, &Silent).unwrap()
+    };
+    let free = sized(None);
+    let mut most = free.planned_value.unwrap();
+    for nodes in [12, 6, 1] {
+        let graph = sized(Some(nodes));
+        assert!(graph.nodes.len() <= nodes, "{}", graph.nodes.len());
+        let value = graph.planned_value.unwrap();
+        assert!(value <= most + 1e-6, "{nodes}: {value} {most}");
+        most = value;
+        let visits: f64 = graph.nodes.iter().map(|node| node.visits).sum();
+        assert!((visits - 1.0).abs() < 1e-9);
+    }
 }
 
 /// A light at 5 shows where one is; to stop near 0 pays (LightDark1D of POMDPModels.jl, with the sensor given).
@@ -236,13 +301,10 @@ fn no_more_is_promised_than_is_earned() {
             "{sensor}: {} {mean} {error}",
             plan.value
         );
-        if let Some(graph) = &plan.policy.graph(SPARE, &Silent) {
+        if let Some(graph) = &graph_of(&plan, &scenario) {
+            let value = graph.planned_value.unwrap();
             let (mean, error) = earned_by_graph(&scenario, graph, 4000);
-            assert!(
-                (graph.value - mean).abs() < 4.0 * error,
-                "{} {mean} {error}",
-                graph.value
-            );
+            assert!((value - mean).abs() < 4.0 * error, "{value} {mean} {error}");
         }
     }
 }
