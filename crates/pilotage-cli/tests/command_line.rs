@@ -415,9 +415,9 @@ fn a_policy_graph_goes_the_whole_way() {
         "--nodes",
         "8",
         "--set",
-        "beliefs=100",
+        "beliefs=150",
         "--set",
-        "rounds=2",
+        "rounds=3",
         "--episodes",
         "300",
     ];
