@@ -6,6 +6,7 @@ use super::CodebookPlanner;
 use super::meet::Met;
 use crate::belief::{Codebook, Keeping, Moments};
 use crate::parallel;
+use crate::policy::first_best;
 use crate::solve::grid::Grid;
 
 /// What an action is expected to do at a state: a stratum and a point of the grid.
@@ -269,7 +270,18 @@ impl Rows {
         bends.into_iter().map(|bend| bend / count).collect()
     }
 
-    /// What the best action is worth at the start itself.
+    /// What the best actions are worth in every state over so many steps.
+    fn over(&self, found: &[f64], discount: f64, steps: usize) -> Vec<f64> {
+        let chosen: Vec<usize> = found.chunks(self.actions).map(first_best).collect();
+        let mut values = vec![0.0; chosen.len()];
+        for _ in 0..steps {
+            let value = |state: usize| self.value(&values, state, chosen[state], discount);
+            values = parallel::map(chosen.len(), value);
+        }
+        values
+    }
+
+    /// What the best action is worth at the start itself, over an episode.
     pub(super) fn worth<K: Keeping>(
         &self,
         keeping: &K,
@@ -283,7 +295,10 @@ impl Rows {
             grid: &self.grid,
             length: self.length,
         };
-        let values = self.best(found);
+        let values = match discount.powi(self.length as i32) > NOTHING {
+            true => self.over(found, discount, self.length - 1),
+            false => self.best(found),
+        };
         let start = keeping.start();
         let of = |action| {
             let row = reader.row(keeping, (&start, 0), action, FINE * settings.readings);
@@ -292,6 +307,9 @@ impl Rows {
         (0..self.actions).map(of).fold(f64::NEG_INFINITY, f64::max)
     }
 }
+
+/// Less than this share of what is worth something after an episode is nothing at its start.
+const NOTHING: f64 = 1e-3;
 
 /// So many times as many readings are thought of at the start.
 const FINE: usize = 10;

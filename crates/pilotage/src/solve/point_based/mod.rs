@@ -52,7 +52,7 @@ use walk::{Met, Walker};
 const SOLVER: &str = "point-based";
 
 /// Most bins along a reading where settings do not say, for one and for two readings.
-const BINS: [usize; 2] = [40, 12];
+const BINS: [usize; 2] = [40, 8];
 
 /// Most readings that are cut into bins.
 const MOST_READINGS: usize = BINS.len();
@@ -63,6 +63,9 @@ const SWEEPS: usize = 12;
 /// How far apart the strata of a plan are at least, in units of the logarithm of a standard deviation, and how many there are at most.
 const APART: f64 = 0.05;
 const MOST_STRATA: usize = 200;
+
+/// Walks by which it is found what a plan counts on after the end of an episode.
+const WALKS: usize = 200;
 
 /// Share of what a round has to gain that counts as a gain at a belief.
 const HARDLY: f64 = 0.01;
@@ -80,7 +83,7 @@ pub struct PointBased {
     pub epsilon: f64,
     /// Probability of another action than the best where beliefs are collected; at least 0, at most 1.
     pub exploration: f64,
-    /// Most bins along a reading, at least 2, at most 10000; `auto` for 40 of one reading and 12 of two.
+    /// Most bins along a reading, at least 2, at most 10000; `auto` for 40 of one reading and 8 of two.
     pub bins: Option<usize>,
 }
 
@@ -116,7 +119,7 @@ impl Settings for PointBased {
 /// What point-based value iteration found.
 #[derive(Debug, Clone)]
 pub struct PointBasedPlan {
-    /// What can be earned from the start, at least.
+    /// What can be earned from the start in an episode, at least.
     pub value: f64,
     /// What to do at a belief.
     pub policy: PointBasedPolicy,
@@ -187,8 +190,9 @@ pub fn solve(
     };
     let (met, set, converged) = search.run();
     let strata = codebook(model, &backup.keeping, &met);
+    let value = set.start - search.beyond(&set);
     Ok(PointBasedPlan {
-        value: set.start,
+        value,
         policy: PointBasedPolicy::new(backup, set),
         strata,
         beliefs: met.points.len(),
@@ -288,6 +292,15 @@ impl Search<'_> {
         let actions = 0..self.backup.keeping.actions();
         let vectors = actions.map(|action| Arc::new(self.backup.blind(action)));
         VectorSet::new(vectors.collect(), &self.backup.start)
+    }
+
+    /// What a plan without end counts on after the end of an episode.
+    fn beyond(&self, set: &VectorSet) -> f64 {
+        let walker = Walker {
+            exploration: 0.0,
+            ..self.walker(Some(set))
+        };
+        walker.beyond(set, WALKS)
     }
 
     fn walker<'b>(&'b self, vectors: Option<&'b VectorSet>) -> Walker<'b> {

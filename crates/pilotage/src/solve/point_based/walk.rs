@@ -49,7 +49,7 @@ impl Met {
             self.walks += TOGETHER as u64;
             let found = parallel::map(TOGETHER, |walk| walker.walk(first + walk as u64));
             let before = self.points.len();
-            for belief in found.iter().flatten() {
+            for belief in found.iter().flat_map(|walk| &walk.met) {
                 if self.points.len() < most && self.is_new(belief) {
                     self.points.push(Point::new(belief.probabilities()));
                 }
@@ -80,13 +80,36 @@ pub(super) struct Walker<'a> {
     pub(super) seed: u64,
 }
 
+/// The beliefs of a walk.
+struct Walk {
+    met: Vec<Cells>,
+    /// Whether it went on to the last step of an episode.
+    lasts: bool,
+}
+
 impl Walker<'_> {
-    /// The beliefs of one walk from the start.
-    fn walk(&self, number: u64) -> Vec<Cells> {
+    /// What is expected after an episode of what it begins with, by so many walks; nothing if that is little.
+    pub(super) fn beyond(&self, vectors: &VectorSet, walks: usize) -> f64 {
+        let weight = self.backup.discount.powi(self.length as i32);
+        if weight < SETTLED {
+            return 0.0;
+        }
+        let left = parallel::map(walks, |number| {
+            let walk = self.walk(number as u64);
+            let last = walk.met.last().filter(|_| walk.lasts);
+            last.map_or(0.0, |last| {
+                vectors.best(&Point::new(last.probabilities())).1
+            })
+        });
+        weight * left.iter().sum::<f64>() / walks as f64
+    }
+
+    /// One walk from the start.
+    fn walk(&self, number: u64) -> Walk {
         let keeping = &*self.backup.keeping;
         let mut rng = stream(self.seed, number, Role::Planner);
         let mut full = keeping.start();
-        let mut met = Vec::new();
+        let (mut met, mut lasts) = (Vec::new(), true);
         let (mut weight, mut drawn) = (1.0, None);
         for _ in 0..self.length {
             let action = self.action(&full, &mut drawn, &mut rng);
@@ -94,16 +117,18 @@ impl Walker<'_> {
             weight *= self.backup.discount;
             let chance = uniform(&mut rng);
             if chance < acted.ended || weight < SETTLED {
+                lasts = false;
                 break;
             }
             if chance < acted.ended + acted.restarted {
                 full = keeping.start();
+                met.push(full.clone());
                 continue;
             }
             self.sense(&mut full, action, &mut rng);
             met.push(full.clone());
         }
-        met
+        Walk { met, lasts }
     }
 
     fn action(&self, full: &Cells, drawn: &mut Option<ActionId>, rng: &mut Rng) -> ActionId {
