@@ -18,8 +18,8 @@ fn regions() -> kafaq::Settings {
         cells_along: 32,
         strata: 6,
         walks: 50,
-        epoch_limit: 14,
-        trial: 100,
+        epoch_limit: 12,
+        trial: 50,
         ..kafaq::Settings::default()
     }
 }

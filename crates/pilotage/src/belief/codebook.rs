@@ -153,13 +153,7 @@ impl Codebook {
         for (moments, code) in met.iter().zip(&mut codes) {
             self.write_code(moments, code);
         }
-        let nearest = |code: &Vec<f64>| {
-            let strata = self.strata.iter();
-            strata
-                .map(|stratum| distance(code, &stratum.code))
-                .fold(f64::INFINITY, f64::min)
-        };
-        let mut gaps: Vec<f64> = codes.iter().map(nearest).collect();
+        let mut gaps: Vec<f64> = codes.iter().map(|code| self.gap(code)).collect();
         let mut added = Vec::new();
         while self.strata.len() < most {
             let farthest =
@@ -190,7 +184,7 @@ impl Codebook {
         let candidates: Vec<(&Moments, Vec<f64>)> = sample(CANDIDATES)
             .map(|moments| (moments, coded(moments)))
             .collect();
-        let mut gaps = vec![f64::INFINITY; codes.len()];
+        let mut gaps: Vec<f64> = codes.iter().map(|code| self.gap(code)).collect();
         while self.strata.len() < most && gaps.iter().any(|gap| *gap > apart) {
             let left = |(_, code): &(&Moments, Vec<f64>)| -> f64 {
                 let pairs = gaps.iter().zip(&codes);
@@ -282,6 +276,14 @@ impl Codebook {
             *weight = 1.0 / (*weight + HAIR) / total;
         }
         near
+    }
+
+    /// How far a code is from all strata.
+    fn gap(&self, code: &[f64]) -> f64 {
+        let strata = self.strata.iter();
+        strata
+            .map(|stratum| distance(code, &stratum.code))
+            .fold(f64::INFINITY, f64::min)
     }
 
     fn write_code(&self, moments: &Moments, code: &mut Vec<f64>) {
