@@ -337,3 +337,35 @@ fn who_is_stopped_at_a_wall_starts_from_it() {
     let last = full.mass[keeping.cells() - 1];
     assert!((last - at_wall).abs() < 0.02, "{last} {at_wall}");
 }
+
+/// Wherever a way is stopped, there is a stop at that place.
+#[test]
+fn ways_end_at_stops() {
+    let text = crate::scenario::builtin("u-maze").unwrap();
+    let model = crate::scenario::read(text, "u-maze").unwrap().model;
+    let map = model.map.unwrap();
+    let stops = [0, 1].map(|axis| map.stops(axis));
+    let mut rng = crate::random::stream(1, 0, crate::random::Role::World);
+    let mut met = [vec![false; stops[0].len()], vec![false; stops[1].len()]];
+    for _ in 0..20_000 {
+        let mut point = || [0, 1].map(|_| 7.0 * crate::random::uniform(&mut rng) - 1.0);
+        let (from, to) = (map.nearest_free(point()), point());
+        let end = map.travel(from, to);
+        let cut = |axis: usize| end[axis] != to[axis];
+        let at = |axis: usize| {
+            stops[axis].iter().position(|stop| {
+                let near = (stop.place - end[axis]).abs() < 1e-9;
+                near && stop.upwards == (to[axis] > from[axis])
+            })
+        };
+        if let Some(axis) = [0, 1]
+            .into_iter()
+            .find(|axis| cut(*axis) && at(*axis).is_some())
+        {
+            met[axis][at(axis).unwrap()] = true;
+        } else {
+            assert_eq!(end, to, "{from:?}");
+        }
+    }
+    assert!(met.iter().flatten().all(|met| *met), "{stops:?} {met:?}");
+}
