@@ -65,7 +65,7 @@ const APART: f64 = 0.05;
 const MOST_STRATA: usize = 200;
 
 /// Walks by which it is found what a plan counts on after the end of an episode.
-const WALKS: usize = 200;
+const WALKS: usize = 64;
 
 /// Share of what a round has to gain that counts as a gain at a belief.
 const HARDLY: f64 = 0.01;
