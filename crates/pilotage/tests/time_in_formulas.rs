@@ -58,7 +58,7 @@ value = "if(t < 6, x >= 1.5, x < -1.5)"
 fn planned(scenario: &Scenario, planner: &dyn Planner, form: Form) -> Solution {
     let request = Request {
         runs: 60,
-        nodes: Some(24),
+        nodes: (form == Form::Tree).then_some(24),
         ..Request::form(form)
     };
     plan(planner, &scenario.model, &request, &Silent).unwrap()
