@@ -33,7 +33,7 @@ pub struct Settings {
     pub explore_limit: usize,
     /// Most clusters, and most states; at least 1. Exploration that reaches it ends there, and learning goes on with those there are.
     pub state_limit: usize,
-    /// Most strata that beliefs in full are told apart by; 1 to 1000. How certain they are, and of which mode, tells clusters apart.
+    /// Most strata that beliefs in full are told apart by; at least 1, at most 1000. How certain they are, and of which mode, tells clusters apart.
     pub strata: usize,
     /// Episodes of acting at random, in thought, among whose beliefs these strata are chosen; at least 1.
     pub walks: usize,

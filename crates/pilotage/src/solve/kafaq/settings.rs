@@ -34,7 +34,7 @@ pub struct Settings {
     pub cells_along: usize,
     /// Most neighbourhoods; at least 1.
     pub cell_limit: usize,
-    /// Most strata that beliefs in full are told apart by; 1 to 1000. They share the neighbourhoods that there may be.
+    /// Most strata that beliefs in full are told apart by; at least 1, at most 1000. They share the neighbourhoods that there may be.
     pub strata: usize,
     /// Episodes of acting at random, in thought, among whose beliefs these strata are chosen; at least 1.
     pub walks: usize,
