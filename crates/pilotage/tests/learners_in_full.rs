@@ -120,8 +120,8 @@ fn the_way_to_the_light_is_learned_by_regions() {
 }
 
 #[test]
-fn the_way_to_the_light_is_learned_by_clusters() {
-    for name in ["light-dark-5", "light-dark-binary"] {
+fn places_and_orders_are_learned_by_clusters() {
+    for name in ["light-dark-5", "stock"] {
         let scenario = scenario(name);
         let automaton = learn_clusters(&scenario, &clusters());
         beats_one_thing_always(&scenario, &automaton);
