@@ -187,7 +187,8 @@ impl<'a, K: Keeping> Course<'a, K> {
     fn new(
         planner: &'a CodebookPlanner,
         model: &'a Model,
-        (keeping, updater): (Arc<K>, fn(Coded<K>) -> Updater),
+        keeping: Arc<K>,
+        updater: fn(Coded<K>) -> Updater,
         seed: u64,
     ) -> Self {
         Self {
@@ -290,7 +291,7 @@ impl CodebookPlanner {
         seed: u64,
         observer: &dyn Progress,
     ) -> Result<Plan> {
-        let mut course = Course::new(self, model, (keeping, updater), seed);
+        let mut course = Course::new(self, model, keeping, updater, seed);
         let rounds = course.size.rounds;
         let mut best: Option<Round> = None;
         for round in 0..rounds {
