@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::path::Path;
+
 use common::scenario;
 use pilotage::Error;
 use pilotage::model::{Part, TrackerKind};
@@ -10,7 +12,7 @@ use pilotage::policy::{Automaton, AutomatonRunner, Matching, Node};
 use pilotage::progress::Silent;
 use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Options, compare, evaluate};
-use pilotage::solve::{Registry, Run, arkaq, kafaq};
+use pilotage::solve::{Course, Learned, Registry, Run, arkaq, kafaq};
 use pilotage::world::{ProblemWorld, World};
 
 fn regions() -> kafaq::Settings {
@@ -165,32 +167,27 @@ fn a_run_that_is_stopped_after_every_piece_of_work_ends_like_one_that_is_not() {
     let folder = tempfile::tempdir().unwrap();
 
     let course = || kafaq::course(&scenario.model, &worlds, &regions).unwrap();
-    let path = folder.path().join("kafaq.json");
-    Run::new(course()).unwrap().save(&path).unwrap();
-    let stopped = loop {
-        let mut run = Run::resume(course(), &path).unwrap();
-        let more = run.step(&Silent).unwrap();
-        run.save(&path).unwrap();
-        if more.is_break() {
-            break run.learned();
-        }
-    };
+    let stopped = stopped_often(course, &folder.path().join("kafaq.json"));
     let straight = kafaq::learn(&scenario.model, &worlds, &regions, None, &Silent).unwrap();
     assert_eq!(stopped, straight);
 
     let course = || arkaq::course(&scenario.model, &worlds, &clusters).unwrap();
-    let path = folder.path().join("arkaq.json");
-    Run::new(course()).unwrap().save(&path).unwrap();
-    let stopped = loop {
-        let mut run = Run::resume(course(), &path).unwrap();
-        let more = run.step(&Silent).unwrap();
-        run.save(&path).unwrap();
-        if more.is_break() {
-            break run.learned();
-        }
-    };
+    let stopped = stopped_often(course, &folder.path().join("arkaq.json"));
     let straight = arkaq::learn(&scenario.model, &worlds, &clusters, None, &Silent).unwrap();
     assert_eq!(stopped, straight);
+}
+
+/// What a course comes to that is kept in a file after every piece of work, and gone on with from there.
+fn stopped_often<C: Course>(course: impl Fn() -> C, path: &Path) -> Learned<C::Learning> {
+    Run::new(course()).unwrap().save(path).unwrap();
+    loop {
+        let mut run = Run::resume(course(), path).unwrap();
+        let more = run.step(&Silent).unwrap();
+        run.save(path).unwrap();
+        if more.is_break() {
+            return run.learned();
+        }
+    }
 }
 
 /// Modes that motion and sensing depend on are told, with what changes them, and their policies are kept like others.
