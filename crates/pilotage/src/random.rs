@@ -30,6 +30,11 @@ pub fn stream(seed: u64, episode: u64, role: Role) -> Rng {
     rng
 }
 
+/// A stream that goes on as another does.
+pub(crate) fn fork(rng: &Rng) -> Rng {
+    Rng::deserialize_state(&rng.serialize_state())
+}
+
 /// A draw from N(0, 1).
 pub fn normal(rng: &mut Rng) -> f64 {
     rng.sample(StandardNormal)

@@ -55,6 +55,16 @@ impl Stratum {
         (0..self.weights.len()).fold(0, heavier)
     }
 
+    /// The moments of a belief of this stratum with a given mean.
+    pub fn at(&self, mean: Vec<f64>) -> Moments {
+        Moments {
+            mean,
+            covariance: self.covariance.clone(),
+            weights: self.weights.clone(),
+            step: self.step,
+        }
+    }
+
     /// How uncertain it is: the sum of logarithms of standard deviations.
     fn spread(&self) -> f64 {
         let n = (self.covariance.len() as f64).sqrt() as usize;

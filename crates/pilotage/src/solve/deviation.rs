@@ -40,11 +40,13 @@ pub(crate) fn deviations(
     budget: Budget,
     seed: u64,
 ) -> Vec<Judged> {
-    let runs = Runs::new(space, policy);
+    let runs = Runs::new(space);
     let mut all: Vec<Judged> = Vec::new();
     let (mut episodes, mut steps) = (0, 0);
     while episodes < budget.episodes || (all.len() < most && steps < budget.steps) {
-        let together = parallel::map(TOGETHER, |i| runs.deviating(seed, (episodes + i) as u64));
+        let together = parallel::map(TOGETHER, |i| {
+            runs.deviating(policy, seed, (episodes + i) as u64)
+        });
         for (judged, taken) in together {
             all.extend(judged);
             steps += taken;
@@ -57,35 +59,55 @@ pub(crate) fn deviations(
     all
 }
 
-/// What a policy earns in each of the first episodes of a seed, as many as make so many steps; fewer once it is plainly worse than another
-/// whose returns in them are known. The same for any number of threads.
+/// What policies earn in each of the first episodes of a seed, as many as make so many steps; fewer of one that is plainly worse than another
+/// whose returns in them are known. The same for any number of threads, and for each of them as if it ran alone.
 pub(crate) fn returns(
     space: &dyn BeliefSpace,
-    policy: &dyn Policy,
+    policies: &[&dyn Policy],
     budget: Budget,
     seed: u64,
     other: Option<&[f64]>,
-) -> Vec<f64> {
-    let runs = Runs::new(space, policy);
-    let mut returns: Vec<f64> = Vec::new();
-    let mut taken = 0;
+) -> Vec<Vec<f64>> {
+    let runs = Runs::new(space);
+    let mut returns: Vec<Vec<f64>> = vec![Vec::new(); policies.len()];
+    let mut taken = vec![0; policies.len()];
     let worse = |returns: &[f64]| other.is_some_and(|other| plainly_worse(returns, other));
-    while returns.len() < budget.episodes || (taken < budget.steps && !worse(&returns)) {
-        taken += runs.go_on(seed, TOGETHER, &mut returns);
+    loop {
+        let goes_on = |&i: &usize| {
+            let own = &returns[i];
+            own.len() < budget.episodes || (taken[i] < budget.steps && !worse(own))
+        };
+        let who: Vec<usize> = (0..policies.len()).filter(goes_on).collect();
+        let Some(first) = who.first().map(|&i| returns[i].len()) else {
+            return returns;
+        };
+        let run = |k| runs.together(policies, who.clone(), seed, (first + k) as u64);
+        for alone in parallel::map(TOGETHER, run).into_iter().flatten() {
+            returns[alone.who].push(alone.earned);
+            taken[alone.who] += alone.steps;
+        }
     }
-    returns
 }
 
-/// Goes on to so many episodes where returns in the first of them are known.
+/// Goes on to so many episodes where returns of policies in the first of them are known.
 pub(crate) fn more_returns(
     space: &dyn BeliefSpace,
-    policy: &dyn Policy,
+    policies: &[&dyn Policy],
     episodes: usize,
     seed: u64,
-    returns: &mut Vec<f64>,
+    returns: &mut [Vec<f64>],
 ) {
-    let missing = episodes.saturating_sub(returns.len());
-    Runs::new(space, policy).go_on(seed, missing, returns);
+    let known: Vec<usize> = returns.iter().map(Vec::len).collect();
+    let first = known.iter().copied().fold(episodes, usize::min);
+    let runs = Runs::new(space);
+    let run = |k| {
+        let missing = |&i: &usize| known[i] <= first + k;
+        let who = (0..policies.len()).filter(missing).collect();
+        runs.together(policies, who, seed, (first + k) as u64)
+    };
+    for alone in parallel::map(episodes - first, run).into_iter().flatten() {
+        returns[alone.who].push(alone.earned);
+    }
 }
 
 /// How much more is earned than by another, in the episodes that both have.
@@ -101,13 +123,12 @@ fn plainly_worse(returns: &[f64], other: &[f64]) -> bool {
     gain.mean + 4.0 * gain.stderr < 0.0
 }
 
-/// Episodes of a policy.
+/// Episodes in the world that a model assumes.
 struct Runs<'a> {
     model: &'a Model,
     scenario: Scenario,
     /// By start hypothesis.
     told: Vec<Updater>,
-    policy: &'a dyn Policy,
     /// Share of first decisions from which every action is tried.
     share: f64,
 }
@@ -123,6 +144,22 @@ struct Course<'a> {
     step: usize,
 }
 
+/// An episode as far as several policies have it in common.
+struct Common<'a> {
+    course: Course<'a>,
+    draws: Streams,
+    who: Vec<usize>,
+    earned: f64,
+    counts: f64,
+}
+
+/// What one of several policies earned in an episode, and the steps that it took.
+struct Alone {
+    who: usize,
+    earned: f64,
+    steps: usize,
+}
+
 /// What a step pays, and whether the episode goes on.
 struct Paid {
     reward: f64,
@@ -130,13 +167,12 @@ struct Paid {
 }
 
 impl<'a> Runs<'a> {
-    fn new(space: &'a dyn BeliefSpace, policy: &'a dyn Policy) -> Self {
+    fn new(space: &'a dyn BeliefSpace) -> Self {
         let model = space.model();
         Self {
             model,
             scenario: Scenario::assumed(model),
             told: space.updater().told(space),
-            policy,
             share: EACH / discounted_steps(model, model.episode.length),
         }
     }
@@ -155,25 +191,56 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// Adds the returns of so many episodes after those known, and says how many steps they took.
-    fn go_on(&'a self, seed: u64, episodes: usize, returns: &mut Vec<f64>) -> usize {
-        let first = returns.len();
-        let run = |i| self.plain(seed, (first + i) as u64);
-        let (earned, steps): (Vec<f64>, Vec<usize>) =
-            parallel::map(episodes, run).into_iter().unzip();
-        returns.extend(earned);
-        steps.iter().sum()
-    }
-
-    fn plain(&'a self, seed: u64, episode: u64) -> (f64, usize) {
+    /// An episode of several policies. What they do alike is done once: beliefs are dear.
+    fn together(
+        &'a self,
+        policies: &[&dyn Policy],
+        who: Vec<usize>,
+        seed: u64,
+        episode: u64,
+    ) -> Vec<Alone> {
         let mut draws = Streams::new(seed, episode);
-        let mut course = self.start(&mut draws);
-        let earned = course.followed(None, 0.0, &mut draws);
-        (earned, course.step)
+        let mut going = vec![Common {
+            course: self.start(&mut draws),
+            draws,
+            who,
+            earned: 0.0,
+            counts: 1.0,
+        }];
+        let mut done = Vec::new();
+        while let Some(mut common) = going.pop() {
+            while common.course.step < self.model.episode.length {
+                let held = &common.course.held;
+                let action = |&i: &usize| policies[i].action_in_full(held);
+                let Some(own) = common.who.first().map(action) else {
+                    break;
+                };
+                let others: Vec<usize> = common
+                    .who
+                    .iter()
+                    .copied()
+                    .filter(|i| action(i) != own)
+                    .collect();
+                if !others.is_empty() {
+                    common.who.retain(|i| !others.contains(i));
+                    going.push(common.parted(others));
+                }
+                let paid = common.course.take(own, &mut common.draws);
+                common.earned += common.counts * paid.reward;
+                common.counts *= self.model.discount;
+                if !paid.goes_on {
+                    break;
+                }
+            }
+            let earned = common.earned + common.counts * common.course.world.ending();
+            let steps = common.course.step;
+            done.extend(common.who.iter().map(|&who| Alone { who, earned, steps }));
+        }
+        done
     }
 
     /// The beliefs chosen of an episode, and the steps that it took in all. Beliefs count by their discount.
-    fn deviating(&'a self, seed: u64, episode: u64) -> (Vec<Judged>, usize) {
+    fn deviating(&'a self, policy: &dyn Policy, seed: u64, episode: u64) -> (Vec<Judged>, usize) {
         let mut whims = stream(seed, episode, Role::Exploration);
         let mut draws = Streams::new(seed, episode);
         let mut course = self.start(&mut draws);
@@ -182,7 +249,7 @@ impl<'a> Runs<'a> {
         let mut counts = 1.0;
         while course.step < self.model.episode.length {
             let likely = (self.share * counts).min(1.0);
-            let own = self.policy.action_in_full(&course.held);
+            let own = policy.action_in_full(&course.held);
             if uniform(&mut whims) < likely {
                 // The same draws for every action, and others than those of the episode itself.
                 let number = episode
@@ -191,7 +258,7 @@ impl<'a> Runs<'a> {
                 let tried = |action| {
                     branch.go_back_to(&course);
                     let mut draws = Streams::new(!seed, number);
-                    let earned = branch.followed(Some(action), LITTLE, &mut draws);
+                    let earned = branch.followed(policy, action, &mut draws);
                     (earned, branch.step - course.step)
                 };
                 let tried: Vec<(f64, usize)> = (0..self.model.actions.len()).map(tried).collect();
@@ -211,6 +278,20 @@ impl<'a> Runs<'a> {
             }
         }
         (judged, steps + course.step)
+    }
+}
+
+impl Common<'_> {
+    /// The same episode for those who do something else from here on.
+    fn parted(&self, who: Vec<usize>) -> Self {
+        let mut course = self.course.runs.start(&mut self.draws.fork());
+        course.go_back_to(&self.course);
+        Self {
+            course,
+            draws: self.draws.fork(),
+            who,
+            ..*self
+        }
     }
 }
 
@@ -245,13 +326,12 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// Goes on by the policy, once it has taken the first action if there is one, and returns what that earns from here; no further than
-    /// where what is left counts for less than `little`.
-    fn followed(&mut self, first: Option<ActionId>, little: f64, draws: &mut Streams) -> f64 {
+    /// Takes an action, goes on by a policy, and returns what that earns from here; no further than where what is left counts for little.
+    fn followed(&mut self, policy: &dyn Policy, first: ActionId, draws: &mut Streams) -> f64 {
         let model = self.runs.model;
-        let (mut earned, mut counts, mut next) = (0.0, 1.0, first);
-        while self.step < model.episode.length && counts >= little {
-            let own = || self.runs.policy.action_in_full(&self.held);
+        let (mut earned, mut counts, mut next) = (0.0, 1.0, Some(first));
+        while self.step < model.episode.length && counts >= LITTLE {
+            let own = || policy.action_in_full(&self.held);
             let action = next.take().unwrap_or_else(own);
             let paid = self.take(action, draws);
             earned += counts * paid.reward;
@@ -287,6 +367,49 @@ mod tests {
         }
     }
 
+    fn alone(
+        space: &dyn BeliefSpace,
+        policy: &dyn Policy,
+        other: Option<&[f64]>,
+        seed: u64,
+    ) -> Vec<f64> {
+        returns(space, &[policy], BUDGET, seed, other).concat()
+    }
+
+    /// Up to a place, then down.
+    struct UpTo(f64);
+
+    impl Policy for UpTo {
+        fn action(&self, belief: &Belief) -> ActionId {
+            if belief.mean[0] < self.0 { 1 } else { 0 }
+        }
+    }
+
+    #[test]
+    fn who_runs_together_earns_what_each_earns_alone() {
+        let model = find("light-dark-5").unwrap().model;
+        let space = cells_of(&model);
+        let space = space.as_ref();
+        let (here, there) = (UpTo(3.0), UpTo(4.5));
+        let policies: [&dyn Policy; 4] = [&here, &Always(1), &there, &here];
+        let mut together = returns(space, &policies, BUDGET, 1, None);
+        let each: Vec<Vec<f64>> = policies
+            .iter()
+            .map(|policy| alone(space, *policy, None, 1))
+            .collect();
+        assert_eq!(together, each);
+        assert_ne!(each[0], each[2]);
+        // They go on from where each of them is.
+        together[2].truncate(10);
+        together[3].truncate(100);
+        more_returns(space, &policies, 300, 1, &mut together);
+        for (policy, together) in policies.iter().zip(&together) {
+            let mut own = vec![Vec::new()];
+            more_returns(space, &[*policy], 300.max(together.len()), 1, &mut own);
+            assert_eq!(*together, own[0]);
+        }
+    }
+
     #[test]
     fn what_is_expected_is_what_is_earned() {
         let model = find("light-dark-5").unwrap().model;
@@ -302,7 +425,7 @@ mod tests {
         let plan = crate::solve::plan(&planner, &model, &request, &Silent).unwrap();
         let automaton = plan.automaton().unwrap();
         let space = automaton.space(&model);
-        let returns = returns(space.as_ref(), automaton, BUDGET, 3, None);
+        let returns = alone(space.as_ref(), automaton, None, 3);
         let expected = Estimate::of(returns.iter().copied());
         let options = Options {
             episodes: 4000,
@@ -321,11 +444,11 @@ mod tests {
     fn who_is_plainly_worse_is_not_run_to_the_end() {
         let model = find("light-dark-5").unwrap().model;
         let space = cells_of(&model);
-        let up = returns(space.as_ref(), &Always(1), BUDGET, 1, None);
+        let up = alone(space.as_ref(), &Always(1), None, 1);
         assert_eq!(up, vec![0.0; 208], "a hundred steps each, 16 at a time");
-        let stop = returns(space.as_ref(), &Always(0), BUDGET, 1, Some(&up));
+        let stop = alone(space.as_ref(), &Always(0), Some(&up), 1);
         assert!(stop.len() < 100 && gain(&stop, &up).mean < 0.0);
-        let same = returns(space.as_ref(), &Always(2), BUDGET, 1, Some(&up));
+        let same = alone(space.as_ref(), &Always(2), Some(&up), 1);
         assert_eq!(gain(&same, &up), Estimate::of([0.0, 0.0].into_iter()));
         assert_eq!(same.len(), up.len());
     }

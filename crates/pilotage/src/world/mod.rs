@@ -17,7 +17,7 @@ pub use observation::Observation;
 pub use problem::ProblemWorld;
 
 use crate::model::{ActionId, ModeId, Then};
-use crate::random::{Rng, Role, stream};
+use crate::random::{Rng, Role, fork, stream};
 
 /// A world to act in.
 pub trait World: Send {
@@ -105,6 +105,14 @@ impl Streams {
         Self {
             world: stream(seed, episode, Role::World),
             sensor: stream(seed, episode, Role::Sensor),
+        }
+    }
+
+    /// The same streams from where they are, for an episode that goes on in two ways.
+    pub(crate) fn fork(&self) -> Self {
+        Self {
+            world: fork(&self.world),
+            sensor: fork(&self.sensor),
         }
     }
 }

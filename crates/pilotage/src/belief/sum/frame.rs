@@ -102,6 +102,18 @@ pub(super) fn root(covariance: &[f64], n: usize) -> Few {
 
 /// The same, with room for it.
 pub(super) fn root_into(covariance: &[f64], n: usize, root: &mut [f64]) {
+    // Loops whose lengths are known are unrolled.
+    match n {
+        1 => root_of(covariance, 1, root),
+        2 => root_of(covariance, 2, root),
+        3 => root_of(covariance, 3, root),
+        _ => root_of(covariance, n, root),
+    }
+}
+
+#[inline(always)]
+fn root_of(covariance: &[f64], n: usize, root: &mut [f64]) {
+    let (covariance, root) = (&covariance[..n * n], &mut root[..n * n]);
     root.fill(0.0);
     let scale = (0..n).fold(0.0, |most: f64, i| most.max(covariance[i * n + i]));
     for j in 0..n {
@@ -131,7 +143,17 @@ pub(super) fn place(mean: &[f64], root: &[f64], z: &[f64], to: &mut [f64]) {
 /// Turns `x` into `L^-1 x` for the root `L` of a covariance; returns the logarithm of its density under N(0, L L'). Directions without
 /// variance are left out.
 pub(super) fn whiten(root: &[f64], x: &mut [f64]) -> f64 {
-    let n = x.len();
+    match x.len() {
+        1 => whiten_of(root, 1, x),
+        2 => whiten_of(root, 2, x),
+        3 => whiten_of(root, 3, x),
+        n => whiten_of(root, n, x),
+    }
+}
+
+#[inline(always)]
+fn whiten_of(root: &[f64], n: usize, x: &mut [f64]) -> f64 {
+    let (root, x) = (&root[..n * n], &mut x[..n]);
     let (mut log, mut volume) = (0.0, 1.0_f64);
     for i in 0..n {
         let before: f64 = (0..i).map(|k| root[i * n + k] * x[k]).sum();

@@ -3,6 +3,9 @@
 /// Most values that are held at once.
 pub(super) const MOST_HELD: usize = 32;
 
+/// As many as most expressions hold: much room takes long to clear.
+const FEW_HELD: usize = 6;
+
 /// What is made of one value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Unary {
@@ -57,6 +60,8 @@ enum Op {
     WithConstant(Binary, f64),
     /// A binary operation whose right side is a variable.
     WithVariable(Binary, usize),
+    /// The square of a value.
+    Square,
     /// Of a condition and two values, the first value where the condition is true.
     Choose,
 }
@@ -66,6 +71,8 @@ enum Op {
 pub(super) struct Tape {
     ops: Vec<Op>,
     held: usize,
+    /// Most values that are held on the way.
+    deepest: usize,
 }
 
 impl Tape {
@@ -76,12 +83,17 @@ impl Tape {
 
     pub(super) fn constant(&mut self, value: f64) {
         self.ops.push(Op::Constant(value));
-        self.held += 1;
+        self.hold();
     }
 
     pub(super) fn variable(&mut self, variable: usize) {
         self.ops.push(Op::Variable(variable));
+        self.hold();
+    }
+
+    fn hold(&mut self) {
         self.held += 1;
+        self.deepest = self.deepest.max(self.held);
     }
 
     pub(super) fn unary(&mut self, unary: Unary) {
@@ -98,6 +110,7 @@ impl Tape {
             [.., Op::Constant(x), Op::Constant(y)] => {
                 self.fold(2, binary.of(x, y), Op::Binary(binary));
             }
+            [.., Op::Constant(2.0)] if binary == Binary::Power => self.replace(1, Op::Square),
             [.., Op::Constant(y)] => self.replace(1, Op::WithConstant(binary, y)),
             [.., Op::Variable(y)] => self.replace(1, Op::WithVariable(binary, y)),
             _ => self.ops.push(Op::Binary(binary)),
@@ -132,8 +145,15 @@ impl Tape {
     }
 
     pub(super) fn value(&self, variables: &[f64]) -> f64 {
-        // The last value is kept apart, so that most operations do not touch the others; `below[0]` is never read.
-        let mut below = [0.0; MOST_HELD];
+        match self.deepest <= FEW_HELD {
+            true => self.value_in(&mut [0.0; FEW_HELD], variables),
+            false => self.value_in(&mut [0.0; MOST_HELD], variables),
+        }
+    }
+
+    /// The value, with room for those that wait. The last one is kept apart, so that most operations do not touch the others; `below[0]` is
+    /// never read.
+    fn value_in(&self, below: &mut [f64], variables: &[f64]) -> f64 {
         let mut held = 0;
         let mut last = 0.0;
         for op in &self.ops {
@@ -155,6 +175,7 @@ impl Tape {
                 }
                 Op::WithConstant(binary, value) => last = binary.of(last, value),
                 Op::WithVariable(binary, variable) => last = binary.of(last, variables[variable]),
+                Op::Square => last *= last,
                 Op::Choose => {
                     held -= 2;
                     if is_true(below[held]) {

@@ -179,6 +179,8 @@ struct Course<'a, K: Keeping> {
     met: Vec<Met<K::Full>>,
     /// Points of the grid along each variable.
     points: Vec<usize>,
+    /// What the last round made of it.
+    plan: Option<GridValues>,
     /// Rows of the last round, where they are still on the right grid.
     earlier: Option<Rows>,
 }
@@ -201,6 +203,7 @@ impl<'a, K: Keeping> Course<'a, K> {
             shapes: Vec::new(),
             met: meet(model, keeping.as_ref(), None, planner.episodes, seed),
             points: planner.first_points(model),
+            plan: None,
             earlier: None,
             keeping,
         }
@@ -221,6 +224,7 @@ impl<'a, K: Keeping> Course<'a, K> {
         let seed = self.seed.wrapping_add(2 + round as u64);
         self.met = meet(model, keeping, Some(&values), planner.episodes, seed);
         self.refine_grid(rows, &found, planned);
+        self.plan = Some(values.clone());
         Round {
             values,
             updater,
@@ -248,7 +252,7 @@ impl<'a, K: Keeping> Course<'a, K> {
             (grid, self.model.episode.length),
             &self.met,
             (self.size.refined, self.planner.readings),
-            earlier,
+            (self.plan.as_ref(), earlier),
         )
     }
 

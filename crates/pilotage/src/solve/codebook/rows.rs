@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::CodebookPlanner;
 use super::meet::Met;
+use super::{CodebookPlanner, GridValues};
 use crate::belief::{Codebook, Keeping, Moments};
 use crate::parallel;
 use crate::policy::first_best;
@@ -18,12 +18,20 @@ struct Row {
     next: Vec<(u32, f32)>,
 }
 
-/// All rows, by state and action.
+/// What is known of a state.
+enum State {
+    /// What each action is expected to do.
+    Rows(Vec<Row>),
+    /// What each action was worth in an earlier plan, where no belief came near.
+    Worth(Vec<f64>),
+}
+
+/// What is known of all states.
 pub(super) struct Rows {
     pub grid: Grid,
     /// Steps of an episode.
     length: usize,
-    rows: Vec<Row>,
+    states: Vec<State>,
     actions: usize,
     /// Where an episode starts: states with weights.
     start: Vec<(u32, f32)>,
@@ -55,6 +63,20 @@ impl Reader<'_> {
                 to.push(((stratum * points + point) as u32, share * weight * part));
             }
         }
+    }
+
+    /// Which states beliefs that were met lie between.
+    fn near<F>(&self, met: &[Met<F>]) -> Vec<bool> {
+        let mut near = vec![false; self.codebook.len() * self.grid.len()];
+        let (mut code, mut states) = (Vec::new(), Vec::new());
+        for met in met {
+            states.clear();
+            self.states(&met.moments, &mut code, &mut states, 1.0);
+            for (state, _) in &states {
+                near[*state as usize] = true;
+            }
+        }
+        near
     }
 
     /// What an action leads to at a step.
@@ -126,15 +148,16 @@ fn averaged(rows: &[Row]) -> Row {
 }
 
 impl Rows {
-    /// The rows of a codebook, whose strata have the shapes of beliefs in full, refined on beliefs that were met, for episodes of so many steps. Earlier rows on the same
-    /// grid are taken over where nothing was or is refined: strata stay what they are when others join them.
+    /// The rows of a codebook, whose strata have the shapes of beliefs in full, refined on beliefs that were met, for episodes of so many steps.
+    /// Once there is a plan, rows are found only for the states that beliefs that were met lie between: elsewhere it stays as it is. Earlier
+    /// rows on the same grid are taken over where nothing was or is refined: strata stay what they are when others join them.
     pub(super) fn new<K: Keeping>(
         (keeping, coarse): (&K, &K),
         (codebook, shapes): (&Codebook, &[K::Full]),
         (grid, length): (Grid, usize),
         met: &[Met<K::Full>],
         (most, readings): (usize, usize),
-        earlier: Option<Self>,
+        (plan, earlier): (Option<&GridValues>, Option<Self>),
     ) -> Self {
         let reader = Reader {
             codebook,
@@ -144,16 +167,23 @@ impl Rows {
         let actions = keeping.actions();
         let (points, states) = (grid.len(), codebook.len() * grid.len());
         let refined = refined::<K>(&reader, met, most);
-        let of_state = |state: usize| -> Option<Vec<Row>> {
-            let known = |earlier: &Self| {
-                let inside = state * actions < earlier.rows.len();
-                inside && !earlier.refined.contains(&state)
-            };
-            if earlier.as_ref().is_some_and(known) && !refined.contains_key(&state) {
+        let near = reader.near(met);
+        let kept = |state: usize| {
+            let rows = earlier
+                .as_ref()
+                .filter(|rows| !rows.refined.contains(&state));
+            let known = rows.and_then(|rows| rows.states.get(state));
+            matches!(known, Some(State::Rows(_))) && !refined.contains_key(&state)
+        };
+        let of_state = |state: usize| -> Option<State> {
+            if kept(state) {
                 return None;
             }
             let mean = grid.point(state % points);
-            let step = codebook.stratum(state / points).step;
+            let stratum = codebook.stratum(state / points);
+            if let Some(plan) = plan.filter(|_| !near[state]) {
+                return Some(State::Worth(plan.values_between(&stratum.at(mean))));
+            }
             let (keeping, fulls) = match refined.get(&state) {
                 Some(fulls) => {
                     let moved = |&i: &usize| keeping.moved_to(&met[i].full, &mean);
@@ -165,35 +195,30 @@ impl Rows {
                 }
             };
             let of_action = |action: usize| {
-                let of = |full: &K::Full| reader.row(keeping, (full, step), action, readings);
+                let of =
+                    |full: &K::Full| reader.row(keeping, (full, stratum.step), action, readings);
                 match fulls.as_slice() {
                     [full] => of(full),
                     fulls => averaged(&fulls.iter().map(of).collect::<Vec<_>>()),
                 }
             };
-            Some((0..actions).map(of_action).collect())
+            Some(State::Rows((0..actions).map(of_action).collect()))
         };
         let found = parallel::map(states, of_state);
         let mut earlier = earlier
-            .map_or_else(Vec::new, |earlier| earlier.rows)
+            .map_or_else(Vec::new, |earlier| earlier.states)
             .into_iter();
-        let mut rows = Vec::with_capacity(states * actions);
-        for own in found {
-            let known = earlier.by_ref().take(actions);
-            match own {
-                Some(own) => {
-                    known.for_each(drop);
-                    rows.extend(own);
-                }
-                None => rows.extend(known),
-            }
-        }
+        let states = found.into_iter().filter_map(|own| {
+            let known = earlier.next();
+            own.or(known)
+        });
+        let states = states.collect();
         let mut moments = Moments::default();
         keeping.moments(&keeping.start(), &mut moments);
         let mut start = Vec::new();
         reader.states(&moments, &mut Vec::new(), &mut start, 1.0);
         Self {
-            rows,
+            states,
             actions,
             start: merged(start),
             refined: refined.into_keys().collect(),
@@ -204,14 +229,16 @@ impl Rows {
 
     /// Values of all actions in all states.
     pub(super) fn solve(&self, discount: f64, tolerance: f64) -> Vec<f64> {
-        let states = self.rows.len() / self.actions;
-        let mut values = vec![0.0; states];
+        let mut values: Vec<f64> = vec![0.0; self.states.len()];
         for _ in 0..SWEEPS {
             let (mut change, mut largest) = (0.0_f64, 0.0_f64);
-            for state in 0..states {
-                let best = (0..self.actions)
-                    .map(|action| self.value(&values, state, action, discount))
-                    .fold(f64::NEG_INFINITY, f64::max);
+            for (state, known) in self.states.iter().enumerate() {
+                let best = match known {
+                    State::Worth(worth) => best_of(worth.iter().copied()),
+                    State::Rows(rows) => {
+                        best_of(rows.iter().map(|row| self.worth_of(row, &values, discount)))
+                    }
+                };
                 change = change.max((best - values[state]).abs());
                 largest = largest.max(best.abs());
                 values[state] = best;
@@ -220,14 +247,16 @@ impl Rows {
                 break;
             }
         }
-        let all =
-            (0..states).flat_map(|state| (0..self.actions).map(move |action| (state, action)));
-        all.map(|(state, action)| self.value(&values, state, action, discount))
-            .collect()
-    }
-
-    fn value(&self, values: &[f64], state: usize, action: usize, discount: f64) -> f64 {
-        self.worth_of(&self.rows[state * self.actions + action], values, discount)
+        let mut found = Vec::with_capacity(self.states.len() * self.actions);
+        for known in &self.states {
+            match known {
+                State::Worth(worth) => found.extend_from_slice(worth),
+                State::Rows(rows) => {
+                    found.extend(rows.iter().map(|row| self.worth_of(row, &values, discount)));
+                }
+            }
+        }
+        found
     }
 
     fn worth_of(&self, row: &Row, values: &[f64], discount: f64) -> f64 {
@@ -246,7 +275,7 @@ impl Rows {
 
     /// The value of every state.
     fn best(&self, found: &[f64]) -> Vec<f64> {
-        let best = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let best = |values: &[f64]| best_of(values.iter().copied());
         found.chunks(self.actions).map(best).collect()
     }
 
@@ -275,7 +304,10 @@ impl Rows {
         let chosen: Vec<usize> = found.chunks(self.actions).map(first_best).collect();
         let mut values = vec![0.0; chosen.len()];
         for _ in 0..steps {
-            let value = |state: usize| self.value(&values, state, chosen[state], discount);
+            let value = |state: usize| match &self.states[state] {
+                State::Worth(worth) => worth[chosen[state]],
+                State::Rows(rows) => self.worth_of(&rows[chosen[state]], &values, discount),
+            };
             values = parallel::map(chosen.len(), value);
         }
         values
@@ -304,8 +336,12 @@ impl Rows {
             let row = reader.row(keeping, (&start, 0), action, FINE * settings.readings);
             self.worth_of(&row, &values, discount)
         };
-        (0..self.actions).map(of).fold(f64::NEG_INFINITY, f64::max)
+        best_of((0..self.actions).map(of))
     }
+}
+
+fn best_of(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Less than this share of what is worth something after an episode is nothing at its start.

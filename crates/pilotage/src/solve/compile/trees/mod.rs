@@ -273,17 +273,31 @@ impl Search<'_> {
     fn try_sizes(&self, collected: &Collected, trials: &mut Trials) {
         let all = collected.all();
         let mut growth = Growth::new(collected, all.clone());
+        let sizes = sizes(self.size.nodes);
+        let mut left = sizes.as_slice();
         let first = trials.tried.len();
         let (mut best, mut since) = (first, 0);
-        for nodes in sizes(self.size.nodes) {
-            let tree = self.of_size((collected, &all), &mut growth, nodes);
-            since += 1;
-            let known = trials.tried[first..].iter();
-            if !known
-                .map(|known| &known.tree.tree)
-                .any(|known| *known == tree.tree)
-            {
-                let returns = self.returns(&tree, trials);
+        while !left.is_empty() && since < PATIENCE {
+            // So many are tried whatever they earn.
+            let few = left.iter().take_while(|&&nodes| nodes < FEW).count();
+            let (now, later) = left.split_at((few + 1).max(PATIENCE - since).min(left.len()));
+            left = later;
+            let mut fresh: Vec<Option<Automaton>> = Vec::new();
+            for &nodes in now {
+                let tree = self.of_size((collected, &all), &mut growth, nodes);
+                let tried = trials.tried[first..].iter().map(|tried| &tried.tree);
+                let mut known = tried.chain(fresh.iter().flatten());
+                let is_known = known.any(|known| known.tree == tree.tree);
+                fresh.push((!is_known).then_some(tree));
+            }
+            let trees: Vec<&Automaton> = fresh.iter().flatten().collect();
+            let mut earned = self.returns(&trees, trials).into_iter();
+            for tree in fresh {
+                since += 1;
+                let Some((tree, returns)) = tree.and_then(|tree| Some((tree, earned.next()?)))
+                else {
+                    continue;
+                };
                 trials.add(Tried { returns, tree });
                 let new = trials.tried.len() - 1;
                 let returns = |i: usize| &trials.tried[i].returns;
@@ -291,18 +305,20 @@ impl Search<'_> {
                     (best, since) = (new, 0);
                 }
             }
-            if nodes >= FEW && since >= PATIENCE {
-                break;
-            }
         }
     }
 
-    /// What a tree earns where the model holds, in the same episodes as every other.
-    fn returns(&self, tree: &Automaton, trials: &Trials) -> Vec<f64> {
+    /// What trees earn where the model holds, in the same episodes as every other.
+    fn returns(&self, trees: &[&Automaton], trials: &Trials) -> Vec<Vec<f64>> {
         let seed = self.trial_seed();
         let other = trials.best().map(|best| best.returns.as_slice());
-        let runner = AutomatonRunner::new(tree);
-        deviation::returns(self.space, &runner, self.budget(TRIAL_STEPS), seed, other)
+        let runners: Vec<AutomatonRunner> = trees
+            .iter()
+            .map(|tree| AutomatonRunner::new(tree))
+            .collect();
+        let policies: Vec<&dyn Policy> =
+            runners.iter().map(|runner| runner as &dyn Policy).collect();
+        deviation::returns(self.space, &policies, self.budget(TRIAL_STEPS), seed, other)
     }
 
     /// Finds the best of the trees that were tried, in more episodes.
@@ -311,9 +327,7 @@ impl Search<'_> {
         while finalists.len() > 1 {
             let longest = finalists.iter().map(|&i| trials.tried[i].returns.len());
             let episodes = 2 * longest.max().unwrap_or(0);
-            for &i in &finalists {
-                self.go_on(&mut trials.tried[i], episodes);
-            }
+            self.go_on(trials, &finalists, episodes);
             let earned = |i: usize| trials.tried[i].earned();
             finalists.sort_by(|&a, &b| earned(b).total_cmp(&earned(a)));
             finalists.truncate(finalists.len().div_ceil(2));
@@ -326,18 +340,27 @@ impl Search<'_> {
         loop {
             let chosen = trials.smallest(self.size.loss)?;
             let episodes = trials.best()?.returns.len();
-            let tried = &mut trials.tried[chosen];
+            let tried = &trials.tried[chosen];
             if tried.returns.len() >= episodes {
                 return Some(tried.tree.clone());
             }
-            self.go_on(tried, episodes);
+            self.go_on(trials, &[chosen], episodes);
         }
     }
 
-    fn go_on(&self, tried: &mut Tried, episodes: usize) {
-        let runner = AutomatonRunner::new(&tried.tree);
+    /// Runs some of the trees that were tried in more episodes.
+    fn go_on(&self, trials: &mut Trials, who: &[usize], episodes: usize) {
+        let own = |&i: &usize| std::mem::take(&mut trials.tried[i].returns);
+        let mut returns: Vec<Vec<f64>> = who.iter().map(own).collect();
+        let runner = |&i: &usize| AutomatonRunner::new(&trials.tried[i].tree);
+        let runners: Vec<AutomatonRunner> = who.iter().map(runner).collect();
+        let policies: Vec<&dyn Policy> =
+            runners.iter().map(|runner| runner as &dyn Policy).collect();
         let seed = self.trial_seed();
-        deviation::more_returns(self.space, &runner, episodes, seed, &mut tried.returns);
+        deviation::more_returns(self.space, &policies, episodes, seed, &mut returns);
+        for (&i, returns) in who.iter().zip(returns) {
+            trials.tried[i].returns = returns;
+        }
     }
 
     fn trial_seed(&self) -> u64 {
