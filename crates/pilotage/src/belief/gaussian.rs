@@ -14,6 +14,15 @@ pub(crate) fn normal_density(x: f64) -> f64 {
     (-0.5 * x * x).exp() / (std::f64::consts::TAU).sqrt()
 }
 
+/// Steps along the coordinates of a cube whose multiples, modulo 1, are evenly spread in it: powers of the inverse of the root above 1 of
+/// `x^(dim + 1) = x + 1` (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
+pub(crate) fn even_steps(dim: usize) -> Vec<f64> {
+    const ROUNDS: usize = 60;
+    let power = 1.0 / (dim as f64 + 1.0);
+    let root = (0..ROUNDS).fold(2.0_f64, |x, _| (1.0 + x).powf(power));
+    (1..=dim).map(|i| root.powi(-(i as i32))).collect()
+}
+
 /// Inverse of the standard normal cdf, for `p` in (0, 1): P. J. Acklam's rational approximation (2003), with one step of Halley's
 /// method, which leaves errors of a few roundings.
 pub(crate) fn normal_quantile(p: f64) -> f64 {

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use super::grid::{Grid, Part, Spot};
-use crate::belief::gaussian::interval_probability;
+use crate::belief::gaussian::{even_steps, interval_probability};
 use crate::model::{Doing, Dynamics, Interval, ModeId};
 use crate::parallel;
 
@@ -214,6 +214,8 @@ pub(crate) struct Sensor {
     ends: Vec<Interval>,
     /// Whether the agent sees the mode beside the numbers that it reads.
     sees_mode: bool,
+    /// Steps of the lattice along which readings are spread.
+    steps: Vec<f64>,
 }
 
 impl Sensor {
@@ -237,6 +239,7 @@ impl Sensor {
             tables: (0..dynamics.actions()).map(&mut of_action).collect(),
             ends: dynamics.saturates().to_vec(),
             sees_mode,
+            steps: even_steps(dynamics.readings()),
         }
     }
 
@@ -252,6 +255,11 @@ impl Sensor {
     /// Whether the agent sees the mode beside the numbers that it reads.
     pub(crate) fn sees_mode(&self) -> bool {
         self.sees_mode
+    }
+
+    /// Steps of the lattice along which readings are spread, one for each of them.
+    pub(super) fn steps(&self) -> &[f64] {
+        &self.steps
     }
 
     /// Logarithm of how likely numbers are in a cell of a mode.

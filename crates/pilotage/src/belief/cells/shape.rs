@@ -79,7 +79,7 @@ impl CellsKeeping {
         let (mode, cell) = (state / self.cells(), state % self.cells());
         let parts = &self.sensor.table(action, mode).heard[cell];
         let heard = &parts[(share * parts.len() as f64) as usize];
-        let mut values = heard.drawn(k);
+        let mut values = heard.drawn(k, self.sensor.steps());
         for (value, ends) in values.iter_mut().zip(self.sensor.ends()) {
             *value = value.clamp(ends.low, ends.high);
         }
@@ -218,17 +218,11 @@ impl CellsKeeping {
 }
 
 impl Heard {
-    /// The `k`-th of readings that are spread as this Gaussian is, along a lattice of the generalised golden ratio (M. Roberts, "The
-    /// unreasonable effectiveness of quasirandom sequences", 2018).
-    fn drawn(&self, k: usize) -> Vec<f64> {
+    /// The `k`-th of readings that are spread as this Gaussian is, by the steps of an even lattice.
+    fn drawn(&self, k: usize, steps: &[f64]) -> Vec<f64> {
         let m = self.mean.len();
-        let golden = golden(m);
-        let normals: Vec<f64> = (0..m)
-            .map(|i| {
-                let step = golden.powi(-(i as i32 + 1));
-                normal_quantile((0.5 + (k as f64 + 1.0) * step).fract())
-            })
-            .collect();
+        let normal = |step: &f64| normal_quantile((0.5 + (k as f64 + 1.0) * step).fract());
+        let normals: Vec<f64> = steps[..m].iter().map(normal).collect();
         let value = |i: usize| {
             let row = &self.factor[i * m..][..=i];
             let noise: f64 = row.iter().zip(&normals).map(|(l, z)| l * z).sum();
@@ -236,10 +230,4 @@ impl Heard {
         };
         (0..m).map(value).collect()
     }
-}
-
-/// The root above 1 of `x^(d + 1) = x + 1`.
-fn golden(d: usize) -> f64 {
-    let power = 1.0 / (d as f64 + 1.0);
-    (0..30).fold(2.0f64, |x, _| (1.0 + x).powf(power))
 }

@@ -6,7 +6,7 @@ use super::line::pieces;
 use super::sensor::Sensor;
 use super::{Sum, SumKeeping};
 use crate::belief::full::Sensed;
-use crate::belief::gaussian::normal_quantile;
+use crate::belief::gaussian::{even_steps, normal_quantile};
 use crate::belief::reading::Reading;
 use crate::model::{ActionId, ModeId};
 
@@ -200,8 +200,7 @@ fn evenly(mut drawn: Vec<Drawn>, most: usize) -> Vec<Drawn> {
     kept
 }
 
-/// Points in a cube, each coordinate of which takes every `(k + 1/2) / points` once: a lattice along powers of the inverse of the plastic
-/// number and its kin, along which multiples are most evenly spread (M. Roberts, 2018).
+/// Points in a cube, each coordinate of which takes every `(k + 1/2) / points` once: a lattice near that of [`even_steps`].
 struct Lattice {
     points: usize,
     strides: Vec<usize>,
@@ -209,17 +208,15 @@ struct Lattice {
 
 impl Lattice {
     fn new(points: usize, dim: usize) -> Self {
-        // The root of `x^(dim + 1) = x + 1`.
-        let ratio = (0..60).fold(2.0_f64, |x, _| (1.0 + x).powf(1.0 / (dim as f64 + 1.0)));
-        let stride = |i: usize| {
-            let ideal = (points as f64 * ratio.powi(-(i as i32) - 1)).round() as usize;
+        let stride = |step: &f64| {
+            let ideal = (points as f64 * step).round() as usize;
             let near = (0..=points).flat_map(|off| [ideal + off, ideal.saturating_sub(off)]);
             let mut coprime = near.filter(|stride| *stride > 0 && gcd(*stride, points) == 1);
             coprime.next().unwrap_or(1)
         };
         Self {
             points,
-            strides: (0..dim).map(stride).collect(),
+            strides: even_steps(dim).iter().map(stride).collect(),
         }
     }
 

@@ -81,7 +81,7 @@ impl Backup {
             partition = Partition::new(keeping, action, &to, self.bins);
             let likely = partition.likelihoods(keeping, action, &ahead.states);
             let later;
-            (picks, later) = best_after(&likely, &ahead, set);
+            (picks, later) = best_after(likely, &ahead, set);
             value += self.discount * later;
         }
         Choice {
@@ -157,21 +157,21 @@ impl Backup {
     }
 }
 
-/// The best vector after each signal (rows of `likely`), and what they are worth together.
-fn best_after(likely: &DMatrix<f64>, ahead: &Point, set: &VectorSet) -> (Vec<usize>, f64) {
-    let (signals, met) = likely.shape();
-    let joint = DMatrix::from_fn(met, signals, |i, signal| {
-        likely[(signal, i)] * ahead.masses[i]
-    });
+/// The best vector after each signal (rows of how likely it is in each state), and what they are worth together.
+fn best_after(mut joint: DMatrix<f64>, ahead: &Point, set: &VectorSet) -> (Vec<usize>, f64) {
+    let (signals, met) = joint.shape();
+    for (mut column, mass) in joint.column_iter_mut().zip(&ahead.masses) {
+        column *= *mass;
+    }
     let vectors = DMatrix::from_fn(met, set.vectors.len(), |i, vector| {
         set.vectors[vector].values[ahead.states[i]]
     });
-    // Columns side by side: what each vector is worth together with each signal.
-    let worth = vectors.tr_mul(&joint);
+    // What each vector is worth together with each signal.
+    let worth = &joint * &vectors;
     let best = |signal: usize| {
-        let column = worth.column(signal);
+        let row = worth.row(signal);
         let first = (0, f64::NEG_INFINITY);
-        let pairs = column.iter().copied().enumerate();
+        let pairs = row.iter().copied().enumerate();
         pairs.fold(first, |best, next| match next.1 > best.1 {
             true => next,
             false => best,
@@ -179,11 +179,11 @@ fn best_after(likely: &DMatrix<f64>, ahead: &Point, set: &VectorSet) -> (Vec<usi
     };
     let mut chosen: Vec<(usize, f64)> = (0..signals).map(best).collect();
     // What cannot be sensed here goes where the likeliest signal goes, so that nothing is kept for it.
-    let likely = |signal: &usize| joint.column(*signal).sum();
+    let likely = |signal: &usize| joint.row(*signal).sum();
     let likeliest = (0..signals).max_by(|a, b| likely(a).total_cmp(&likely(b)));
     let usual = likeliest.map_or(0, |signal| chosen[signal].0);
     for signal in (0..signals).filter(|signal| likely(signal) <= NEVER) {
-        chosen[signal] = (usual, worth[(usual, signal)]);
+        chosen[signal] = (usual, worth[(signal, usual)]);
     }
     let value = chosen.iter().map(|(_, value)| value).sum();
     (chosen.into_iter().map(|(pick, _)| pick).collect(), value)
