@@ -8,7 +8,8 @@ use pilotage::scenario::{self, Scenario};
 use pilotage::simulate::{Estimate, Options};
 use pilotage::solve::{CodebookPlanner, Form, Planner, Request, Solution, ValueIteration, plan};
 
-/// A prize on the right until step 6, and on the left from then on; who is late has to be on the way before.
+/// A prize on the right until step 6, and on the left from then on; who is late has to be on the way before. A belief is as wide at every
+/// step, so that nothing but the step tells the time.
 fn turning(reward: &str) -> Scenario {
     let text = format!(
         r#"
@@ -20,7 +21,7 @@ names = ["x"]
 bounds = [[-4.0, 4.0]]
 [start]
 mean = [0.0]
-covariance = [[0.2]]
+covariance = [[0.05]]
 [motion]
 A = [[1.0]]
 B = [[1.0]]
