@@ -6,7 +6,7 @@
 //! 1. Beliefs are met by acting at random, and strata chosen among them so that all are near one.
 //! 2. From every stratum and mean of the grid every action leads to the beliefs after evenly spread readings, which are read as the strata
 //!    that they lie between and the points of the grid around their mean. Where beliefs in full were met, they take the place of what
-//!    the codebook makes of them.
+//!    the codebook makes of them. Once there is a plan, only those are looked at that beliefs were met near: of the others it is kept.
 //! 3. Value iteration on these sparse rows.
 //! 4. The greedy policy is run, with some actions at random; the beliefs it meets go back to 1, where strata of them join the others.
 //!
