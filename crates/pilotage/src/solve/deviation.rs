@@ -3,7 +3,7 @@
 //! Episodes of the world that a model assumes are run under the policy. Where a belief is kept in full, returns are sums of what it expects
 //! to be paid rather than of what is paid: the same on average, and less by chance (Rao-Blackwell).
 
-use crate::belief::{BeliefSpace, Held, Pace, Updater, is_kept};
+use crate::belief::{BeliefSpace, Held, Updater, is_kept};
 use crate::model::{ActionId, Model, Then};
 use crate::parallel;
 use crate::policy::Policy;
@@ -131,8 +131,6 @@ struct Runs<'a> {
     told: Vec<Updater>,
     /// Share of first decisions from which every action is tried.
     share: f64,
-    /// Whether a step is dear enough to be taken once for several policies.
-    shares: bool,
 }
 
 /// An episode as it goes on.
@@ -175,7 +173,6 @@ impl<'a> Runs<'a> {
             model,
             scenario: Scenario::assumed(model),
             told: space.updater().told(space),
-            shares: space.updater().pace() != Pace::Fast,
             share: EACH / discounted_steps(model, model.episode.length),
         }
     }
@@ -194,7 +191,7 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// An episode of several policies. What they do alike is done once, unless that takes longer than to do it again.
+    /// An episode of several policies. What they do alike is done once: beliefs are dear.
     fn together(
         &'a self,
         policies: &[&dyn Policy],
@@ -202,20 +199,14 @@ impl<'a> Runs<'a> {
         seed: u64,
         episode: u64,
     ) -> Vec<Alone> {
-        let begin = |who: Vec<usize>| {
-            let mut draws = Streams::new(seed, episode);
-            Common {
-                course: self.start(&mut draws),
-                draws,
-                who,
-                earned: 0.0,
-                counts: 1.0,
-            }
-        };
-        let mut going: Vec<Common<'_>> = match self.shares {
-            true => vec![begin(who)],
-            false => who.into_iter().map(|i| begin(vec![i])).collect(),
-        };
+        let mut draws = Streams::new(seed, episode);
+        let mut going = vec![Common {
+            course: self.start(&mut draws),
+            draws,
+            who,
+            earned: 0.0,
+            counts: 1.0,
+        }];
         let mut done = Vec::new();
         while let Some(mut common) = going.pop() {
             while common.course.step < self.model.episode.length {
