@@ -221,10 +221,12 @@ impl<'a, K: Keeping> Course<'a, K> {
         let coded = Coded::new(model, Arc::clone(&self.keeping), Arc::clone(&codebook));
         let updater = (self.updater)(coded);
         let earned = self.earned(&values, &updater);
-        let seed = self.seed.wrapping_add(2 + round as u64);
-        self.met = meet(model, keeping, Some(&values), planner.episodes, seed);
-        self.refine_grid(rows, &found, planned);
-        self.plan = Some(values.clone());
+        if round + 1 < self.size.rounds {
+            let seed = self.seed.wrapping_add(2 + round as u64);
+            self.met = meet(model, keeping, Some(&values), planner.episodes, seed);
+            self.refine_grid(rows, &found, planned);
+            self.plan = Some(values.clone());
+        }
         Round {
             values,
             updater,

@@ -229,16 +229,13 @@ impl Rows {
 
     /// Values of all actions in all states.
     pub(super) fn solve(&self, discount: f64, tolerance: f64) -> Vec<f64> {
-        let mut values: Vec<f64> = vec![0.0; self.states.len()];
+        let states = self.states.len();
+        let mut values = vec![0.0; states];
         for _ in 0..SWEEPS {
             let (mut change, mut largest) = (0.0_f64, 0.0_f64);
-            for (state, known) in self.states.iter().enumerate() {
-                let best = match known {
-                    State::Worth(worth) => best_of(worth.iter().copied()),
-                    State::Rows(rows) => {
-                        best_of(rows.iter().map(|row| self.worth_of(row, &values, discount)))
-                    }
-                };
+            for state in 0..states {
+                let value = |action| self.value(&values, state, action, discount);
+                let best = best_of((0..self.actions).map(value));
                 change = change.max((best - values[state]).abs());
                 largest = largest.max(best.abs());
                 values[state] = best;
@@ -247,16 +244,17 @@ impl Rows {
                 break;
             }
         }
-        let mut found = Vec::with_capacity(self.states.len() * self.actions);
-        for known in &self.states {
-            match known {
-                State::Worth(worth) => found.extend_from_slice(worth),
-                State::Rows(rows) => {
-                    found.extend(rows.iter().map(|row| self.worth_of(row, &values, discount)));
-                }
-            }
+        let all =
+            (0..states).flat_map(|state| (0..self.actions).map(move |action| (state, action)));
+        all.map(|(state, action)| self.value(&values, state, action, discount))
+            .collect()
+    }
+
+    fn value(&self, values: &[f64], state: usize, action: usize, discount: f64) -> f64 {
+        match &self.states[state] {
+            State::Worth(worth) => worth[action],
+            State::Rows(rows) => self.worth_of(&rows[action], values, discount),
         }
-        found
     }
 
     fn worth_of(&self, row: &Row, values: &[f64], discount: f64) -> f64 {
@@ -304,10 +302,7 @@ impl Rows {
         let chosen: Vec<usize> = found.chunks(self.actions).map(first_best).collect();
         let mut values = vec![0.0; chosen.len()];
         for _ in 0..steps {
-            let value = |state: usize| match &self.states[state] {
-                State::Worth(worth) => worth[chosen[state]],
-                State::Rows(rows) => self.worth_of(&rows[chosen[state]], &values, discount),
-            };
+            let value = |state: usize| self.value(&values, state, chosen[state], discount);
             values = parallel::map(chosen.len(), value);
         }
         values

@@ -8,7 +8,7 @@ use super::backup::Backup;
 use super::graph::{self, Grapher};
 use super::point::{Point, ValueVector, VectorSet};
 use super::{occupied, size};
-use crate::belief::{Belief, Cells, CellsKeeping, Codebook, Held, Keeping, Moments};
+use crate::belief::{Belief, Cells, CellsKeeping, Codebook, Held, Keeping};
 use crate::model::{ActionId, Model};
 use crate::policy::{Policy, PolicyGraph};
 use crate::progress::Progress;
@@ -87,12 +87,8 @@ impl Read {
     fn cells(&self, belief: &Belief) -> Cells {
         let last = self.codebook.len().saturating_sub(1);
         let stratum = self.codebook.stratum(belief.stratum.min(last));
-        self.policy.keeping().with_moments(&Moments {
-            mean: belief.mean.clone(),
-            covariance: stratum.covariance.clone(),
-            weights: stratum.weights.clone(),
-            step: 0,
-        })
+        let moments = stratum.at(belief.mean.clone());
+        self.policy.keeping().with_moments(&moments)
     }
 }
 
