@@ -42,8 +42,17 @@ const CERTAIN: f64 = 1e-3;
 const LOOKED_AT: usize = 4_000;
 const CANDIDATES: usize = 400;
 
-/// A belief lies between so many strata.
-const BETWEEN: usize = 4;
+/// A belief lies between so many strata at most.
+const BETWEEN: usize = 8;
+
+/// What it costs to lie between strata that are far away, beside not lying where they are on average, both as squares.
+const FARNESS: f64 = 0.05;
+
+/// Times that weights are moved between all pairs of strata at most.
+const EXCHANGES: usize = 20;
+
+/// Weights that move by less have settled.
+const SETTLED: f64 = 1e-4;
 
 impl Stratum {
     /// The mode that is most likely, the first of several.
@@ -263,7 +272,9 @@ impl Codebook {
         best.0
     }
 
-    /// The strata that a belief lies between, at most four, with weights that sum to 1: the inverse of their distances.
+    /// The strata that a belief lies between, at most eight, with weights that sum to 1: on average they are as the belief is, as far
+    /// as that can be, and as near to it as that allows. Were they narrower on average, planners would think that beliefs become
+    /// narrower by themselves.
     pub fn between(&self, moments: &Moments, code: &mut Vec<f64>) -> Vec<(StratumId, f64)> {
         self.write_code(moments, code);
         let mut near: Vec<(StratumId, f64)> = Vec::with_capacity(BETWEEN + 1);
@@ -275,17 +286,13 @@ impl Codebook {
                 near.truncate(BETWEEN);
             }
         }
-        // A hair, so that a stratum met exactly is not infinitely heavy.
-        const HAIR: f64 = 1e-3;
-        // What is far farther than the nearest has nothing to say.
-        const FAR: f64 = 3.0;
-        let reach = near.first().map_or(0.0, |(_, apart)| FAR * (apart + HAIR));
-        near.retain(|(_, apart)| *apart <= reach);
-        let total: f64 = near.iter().map(|(_, apart)| 1.0 / (apart + HAIR)).sum();
-        for (_, weight) in &mut near {
-            *weight = 1.0 / (*weight + HAIR) / total;
-        }
-        near
+        let corners: Vec<&[f64]> = near
+            .iter()
+            .map(|(id, _)| self.strata[*id].code.as_slice())
+            .collect();
+        let weights = barycentric(&corners, code);
+        let shares = near.into_iter().map(|(id, _)| id).zip(weights);
+        shares.filter(|(_, weight)| *weight > 0.0).collect()
     }
 
     /// How far a code is from all strata.
@@ -328,9 +335,100 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
         .sqrt()
 }
 
+/// Weights of corners, the nearest first, that sum to 1 and are none below 0: those with the least `|sum w c - at|^2 + FARNESS sum w |c - at|^2`,
+/// found by moving weight from one corner to another as far as that gains anything.
+fn barycentric(corners: &[&[f64]], at: &[f64]) -> Vec<f64> {
+    let dim = at.len();
+    let offsets: Vec<f64> = corners
+        .iter()
+        .flat_map(|corner| corner.iter().zip(at).map(|(c, x)| c - x))
+        .collect();
+    let offset = |i: usize| &offsets[i * dim..(i + 1) * dim];
+    let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+    let squares: Vec<f64> = (0..corners.len())
+        .map(|i| product(offset(i), offset(i)))
+        .collect();
+    let mut weights = vec![0.0; corners.len()];
+    if let Some(nearest) = weights.first_mut() {
+        *nearest = 1.0;
+    }
+    let mut off: Vec<f64> = offsets.iter().copied().take(dim).collect();
+    for _ in 0..EXCHANGES {
+        let mut most: f64 = 0.0;
+        for i in 0..corners.len() {
+            for j in 0..i {
+                let (to, from) = (offset(i), offset(j));
+                let between: f64 = to.iter().zip(from).map(|(a, b)| (a - b) * (a - b)).sum();
+                if between <= 0.0 {
+                    continue;
+                }
+                let slope = product(&off, to) - product(&off, from)
+                    + 0.5 * FARNESS * (squares[i] - squares[j]);
+                let moved = (-slope / between).max(-weights[i]).min(weights[j]);
+                weights[i] = (weights[i] + moved).max(0.0);
+                weights[j] = (weights[j] - moved).max(0.0);
+                for ((off, a), b) in off.iter_mut().zip(to).zip(from) {
+                    *off += moved * (a - b);
+                }
+                most = most.max(moved.abs());
+            }
+        }
+        if most < SETTLED {
+            break;
+        }
+    }
+    weights
+}
+
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        #[test]
+        fn a_belief_is_as_the_strata_that_it_lies_between(
+            corners in proptest::collection::vec(proptest::collection::vec(-1.0..1.0_f64, 3), 1..9),
+            shares in proptest::collection::vec(0.0..1.0_f64, 8),
+        ) {
+            let total: f64 = shares[..corners.len()].iter().sum();
+            prop_assume!(total > 0.1);
+            let at: Vec<f64> = (0..3)
+                .map(|i| corners.iter().zip(&shares).map(|(c, w)| w / total * c[i]).sum())
+                .collect();
+            let mut corners: Vec<&[f64]> = corners.iter().map(Vec::as_slice).collect();
+            corners.sort_by(|a, b| distance(a, &at).total_cmp(&distance(b, &at)));
+            let weights = barycentric(&corners, &at);
+            prop_assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+            prop_assert!(weights.iter().all(|weight| *weight >= -1e-12));
+            let mean: Vec<f64> = (0..3)
+                .map(|i| corners.iter().zip(&weights).map(|(c, w)| w * c[i]).sum())
+                .collect();
+            // No worse than the nearest alone would be.
+            let far: f64 = corners
+                .iter()
+                .zip(&weights)
+                .map(|(c, w)| w * distance(c, &at).powi(2))
+                .sum();
+            let cost = distance(&mean, &at).powi(2) + FARNESS * far;
+            let nearest = distance(corners[0], &at).powi(2);
+            prop_assert!(cost <= (1.0 + FARNESS) * nearest + 1e-12);
+        }
+    }
+
+    #[test]
+    fn halfway_between_two_is_half_of_each() {
+        let corners: [&[f64]; 3] = [&[0.0, 0.0], &[1.0, 0.0], &[5.0, 0.0]];
+        let weights = barycentric(&corners, &[0.5, 0.0]);
+        assert!((weights[0] - 0.5).abs() < 1e-3, "{weights:?}");
+        assert!((weights[1] - 0.5).abs() < 1e-3, "{weights:?}");
+        // Outside of all it is the nearest.
+        assert_eq!(barycentric(&corners, &[-1.0, 0.0]), [1.0, 0.0, 0.0]);
+        // A third of the way: nearly so, as what is far counts against itself.
+        let weights = barycentric(&corners, &[1.0 / 3.0, 0.0]);
+        assert!((weights[1] - 1.0 / 3.0).abs() < 0.02, "{weights:?}");
+    }
 
     fn of_deviation(deviation: f64) -> Moments {
         Moments {

@@ -79,6 +79,11 @@ pub trait Keeping: Send + Sync {
     /// have happened, given that the episode goes on, before anything is sensed. If it is certain not to go on, the belief is of no use.
     fn act(&self, full: &mut Self::Full, action: ActionId, step: usize) -> Acted;
 
+    /// The same for who does not ask what it pays or ends.
+    fn go_on(&self, full: &mut Self::Full, action: ActionId, step: usize) {
+        self.act(full, action, step);
+    }
+
     /// Readings that may come after an action at a step, of which `full` is the result, with probabilities that sum to 1: every signal of
     /// a discrete sensor, `most` evenly spread readings otherwise, and that there is none where it may be missing.
     fn readings(

@@ -132,6 +132,10 @@ impl<K: Keeping> Coded<K> {
         self.keeping.act(&mut running.full, action, running.step)
     }
 
+    fn go_on(&self, running: &mut Running<K::Full>, action: ActionId) {
+        self.keeping.go_on(&mut running.full, action, running.step);
+    }
+
     fn sense(
         &self,
         running: &mut Running<K::Full>,
@@ -374,10 +378,14 @@ impl Updater {
 
     /// Takes in an action and what was sensed after it. A belief that another kind of updater holds stays as it is.
     pub fn update(&self, held: &mut Held, action: ActionId, reading: Reading<'_>) {
-        if let (Self::Linear(filter), Kept::Linear { scratch }) = (self, &mut held.kept) {
-            return filter.update(&mut held.read, action, reading, scratch);
+        match (self, &mut held.kept) {
+            (Self::Linear(filter), Kept::Linear { scratch }) => {
+                return filter.update(&mut held.read, action, reading, scratch);
+            }
+            (Self::Sum(coded), Kept::Sum(running)) => coded.go_on(running, action),
+            (Self::Cells(coded), Kept::Cells(running)) => coded.go_on(running, action),
+            _ => {}
         }
-        self.act(held, action);
         self.sense(held, action, reading);
     }
 }

@@ -5,10 +5,10 @@ use nalgebra::DMatrix;
 use super::component::Component;
 use super::frame::Frame;
 use super::reduce::normalise;
-use super::{Sum, SumKeeping};
+use super::{CUT, Sum, SumKeeping};
 use crate::belief::full::Acted;
 use crate::belief::gaussian::normal_density;
-use crate::model::{ActionId, Doing, Effect, Interval, Then, When};
+use crate::model::{ActionId, Doing, Effect, EffectTable, Interval, Then, When};
 
 /// A part of a component in the course of a step.
 struct Part {
@@ -27,15 +27,22 @@ const REACH: f64 = 6.0;
 const PARTS: usize = 8;
 
 impl SumKeeping {
-    /// Takes an action; what the episode goes on with is left in the sum.
-    pub(super) fn take(&self, full: &mut Sum, action: ActionId, step: usize) -> Acted {
+    /// Takes an action, to these effects; what the episode goes on with is left in the sum.
+    pub(super) fn take(
+        &self,
+        full: &mut Sum,
+        action: ActionId,
+        step: usize,
+        effects: &EffectTable,
+    ) -> Acted {
+        let count = full.components.len();
         let mut acted = Acted::default();
         let mut moved = Vec::with_capacity(full.components.len());
         let room = 3 * self.most.max(full.components.len());
         for component in std::mem::take(&mut full.components) {
             let before = moved.len();
             let doing = self.doing(component.mode, action, step);
-            let effects = self.effects.at(step, component.mode, action);
+            let effects = effects.at(step, component.mode, action);
             acted.reward += component.weight * self.running_cost(&component, action);
             let whole = Part {
                 component,
@@ -64,6 +71,9 @@ impl SumKeeping {
         }
         normalise(&mut moved);
         full.components = moved;
+        if full.components.len() > count {
+            self.likeness.reduce(&mut full.components, CUT * self.most);
+        }
         acted
     }
 

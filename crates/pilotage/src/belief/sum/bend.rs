@@ -35,6 +35,9 @@ impl Bend {
             reading: 0.0,
             variable: 0,
         };
+        if sensor.linear().is_some() {
+            return bend;
+        }
         let mut worst = 0.0;
         sensor.ask(&component.mean);
         let (centre, noise) = (sensor.values.clone(), sensor.noise.clone());

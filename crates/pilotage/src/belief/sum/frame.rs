@@ -71,6 +71,23 @@ impl Frame {
         }
     }
 
+    /// A linear function of states, `m x n` row by row, as one of these coordinates, `m x r`: `H root`.
+    pub(super) fn seen(&self, h: &[f64]) -> Few {
+        let (n, r) = (self.dim(), self.rank);
+        let entry = |k: usize| {
+            let (q, i) = (k / r, k % r);
+            (0..n).map(|j| h[q * n + j] * self.root[j * r + i]).sum()
+        };
+        (0..h.len() / n * r).map(entry).collect()
+    }
+
+    /// What it is in the middle, length `m`: `H mean`.
+    pub(super) fn middle_seen(&self, h: &[f64]) -> Few {
+        let rows = h.chunks_exact(self.dim());
+        rows.map(|row| row.iter().zip(&self.mean).map(|(h, x)| h * x).sum())
+            .collect()
+    }
+
     /// Gives a component the moments of a Gaussian in these coordinates.
     pub(super) fn write(&self, inner: &Inner, component: &mut Component) {
         let (n, r) = (self.mean.len(), self.rank);

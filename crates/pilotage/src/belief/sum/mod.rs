@@ -28,7 +28,8 @@ use reduce::{Likeness, normalise};
 use super::full::{Acted, Keeping, Moments, Sensed};
 use super::reading::Reading;
 use crate::model::{
-    ActionId, Doing, Dynamics, EffectTable, Interval, ModeId, Model, StartShape, VariableKind,
+    ActionId, Doing, Dynamics, Effect, EffectTable, Interval, ModeId, Model, StartShape,
+    VariableKind,
 };
 
 /// A sum of Gaussians.
@@ -50,6 +51,8 @@ pub struct SumKeeping {
     model: Model,
     dynamics: Dynamics,
     effects: EffectTable,
+    /// Those of them that do more than pay.
+    changes: EffectTable,
     start: Sum,
     most: usize,
     /// Whether a Gaussian that is too wide for its sensor may become several.
@@ -107,6 +110,15 @@ impl SumKeeping {
             CERTAIN * widest.fold(width, f64::max).max(f64::MIN_POSITIVE)
         };
         let walled = dynamics.walls().filter(|walls| walls.map.is_none());
+        let felt = |effects: Vec<Effect>| match dynamics.walls() {
+            Some(walls) => effects.into_iter().filter_map(|e| walls.felt(e)).collect(),
+            None => effects,
+        };
+        let changing = |effects: Vec<Effect>| -> Vec<Effect> {
+            let mut felt = felt(effects);
+            felt.retain(|effect| effect.change.is_some());
+            felt
+        };
         let most = model.belief.components.unwrap_or(match model.is_linear() {
             true => COMPONENTS.min(FEW * model.modes.len()),
             false => COMPONENTS,
@@ -124,10 +136,8 @@ impl SumKeeping {
             gusts: Rule::cubature(n),
             posterior: (1..=n).map(posterior_rule).collect(),
             bounds: walled.map(|walls| walls.bounds.clone()),
-            effects: EffectTable::new(model, |effects| match dynamics.walls() {
-                Some(walls) => effects.into_iter().filter_map(|e| walls.felt(e)).collect(),
-                None => effects,
-            }),
+            effects: EffectTable::new(model, felt),
+            changes: EffectTable::new(model, changing),
             model: model.clone(),
             dynamics,
         };
@@ -284,12 +294,11 @@ impl Keeping for SumKeeping {
     }
 
     fn act(&self, full: &mut Sum, action: ActionId, step: usize) -> Acted {
-        let count = full.components.len();
-        let acted = self.take(full, action, step);
-        if full.components.len() > count {
-            self.likeness.reduce(&mut full.components, CUT * self.most);
-        }
-        acted
+        self.take(full, action, step, &self.effects)
+    }
+
+    fn go_on(&self, full: &mut Sum, action: ActionId, step: usize) {
+        self.take(full, action, step, &self.changes);
     }
 
     fn readings(

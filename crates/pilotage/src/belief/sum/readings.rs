@@ -36,7 +36,9 @@ impl SumKeeping {
             1 => FINER * most,
             _ => most,
         };
-        let (mut drawn, missing) = self.draw(full, action, step, points.max(1));
+        // Medians leave out what is beyond them.
+        let wider = if points > most { widening(most) } else { 1.0 };
+        let (mut drawn, missing) = self.draw(full, action, step, (points.max(1), wider));
         if self.dynamics.readings() == 1 {
             drawn = evenly(drawn, most);
         }
@@ -54,8 +56,14 @@ impl SumKeeping {
     }
 
     /// Points of the sum, each with a point of the noise, and how likely it is that there is no reading. Shares of the sum, in the order of
-    /// its components, are equal; within them and of the noise, numbers follow a lattice on which each of them is evenly spread.
-    fn draw(&self, full: &Sum, action: ActionId, step: usize, points: usize) -> (Vec<Drawn>, f64) {
+    /// its components, are equal; within them and of the noise, numbers follow a [`Lattice`], so many times as wide.
+    fn draw(
+        &self,
+        full: &Sum,
+        action: ActionId,
+        step: usize,
+        (points, wider): (usize, f64),
+    ) -> (Vec<Drawn>, f64) {
         let (n, m) = (self.dynamics.states(), self.dynamics.readings());
         let lattice = Lattice::new(points, n + m);
         let mut drawn = Vec::with_capacity(points);
@@ -72,11 +80,16 @@ impl SumKeeping {
             let last = i + 1 == full.components.len();
             let end = if last { 1.0 } else { passed };
             let mut own = None;
+            let in_order = widening((component.weight / share).round() as usize);
             while k < points && (k as f64 + 0.5) * share <= end {
-                lattice.normals(k, &mut z);
+                z.copy_from_slice(lattice.point(k));
                 if component.weight >= share {
                     let within = ((k as f64 + 0.5) * share - before) / component.weight;
-                    z[0] = normal_quantile(within.clamp(0.5 * share, 1.0 - 0.5 * share));
+                    let within = within.clamp(0.5 * share, 1.0 - 0.5 * share);
+                    z[0] = in_order * normal_quantile(within);
+                }
+                for z in &mut z {
+                    *z *= wider;
                 }
                 k += 1;
                 let own = own.get_or_insert_with(|| root(&component.covariance, n));
@@ -173,6 +186,16 @@ const FINER: usize = 5;
 /// Readings of less probability do not come.
 const NEVER: f64 = 1e-12;
 
+/// By how much evenly spread quantiles of a normal distribution, its tails left out, have to be moved apart to be as wide as it is.
+fn widening(points: usize) -> f64 {
+    let quantile = |k: usize| normal_quantile((k as f64 + 0.5) / points as f64);
+    let squares: f64 = (0..points).map(|k| quantile(k).powi(2)).sum();
+    match squares > 0.0 {
+        true => (points as f64 / squares).sqrt(),
+        false => 1.0,
+    }
+}
+
 /// Of readings of one number, so many that are equally likely: the medians of those in between.
 fn evenly(mut drawn: Vec<Drawn>, most: usize) -> Vec<Drawn> {
     drawn.sort_by(|a, b| {
@@ -200,60 +223,115 @@ fn evenly(mut drawn: Vec<Drawn>, most: usize) -> Vec<Drawn> {
     kept
 }
 
-/// Points in a cube, each coordinate of which takes every `(k + 1/2) / points` once: a lattice near that of [`even_steps`].
+/// Points of a standard normal distribution, as evenly spread as few can be: quantiles in the orders of
+/// [`even_steps`], turned and stretched so that each coordinate has variance 1 and none goes with another, nor with the order of the points.
 struct Lattice {
-    points: usize,
-    strides: Vec<usize>,
+    dim: usize,
+    /// Point by point.
+    normals: Vec<f64>,
 }
+
+/// A coordinate of which less is left, as a share of its standard deviation, stays as it is: points are too few for it.
+const LEFT: f64 = 0.3;
 
 impl Lattice {
     fn new(points: usize, dim: usize) -> Self {
-        let stride = |step: &f64| {
-            let ideal = (points as f64 * step).round() as usize;
-            let near = (0..=points).flat_map(|off| [ideal + off, ideal.saturating_sub(off)]);
-            let mut coprime = near.filter(|stride| *stride > 0 && gcd(*stride, points) == 1);
-            coprime.next().unwrap_or(1)
-        };
+        let order = (0..points).collect();
+        let steps = even_steps(dim);
+        let along = steps.iter().map(|step| permutation(points, *step));
+        let columns = std::iter::once(order)
+            .chain(along)
+            .map(|cells: Vec<usize>| {
+                let quantile = |cell: usize| normal_quantile((cell as f64 + 0.5) / points as f64);
+                cells.into_iter().map(quantile).collect::<Vec<f64>>()
+            });
+        let mut apart: Vec<Vec<f64>> = Vec::with_capacity(dim + 1);
+        for column in columns {
+            let mut left = column.clone();
+            for other in &apart {
+                let along = mean_product(&left, other);
+                left.iter_mut()
+                    .zip(other)
+                    .for_each(|(x, y)| *x -= along * y);
+            }
+            let enough = mean_product(&left, &left) > LEFT * LEFT * mean_product(&column, &column);
+            let mut kept = if enough { left } else { column };
+            let sd = mean_product(&kept, &kept).sqrt();
+            kept.iter_mut().filter(|_| sd > 0.0).for_each(|x| *x /= sd);
+            apart.push(kept);
+        }
+        let point = |k: usize| apart[1..].iter().map(move |column| column[k]);
         Self {
-            points,
-            strides: even_steps(dim).iter().map(stride).collect(),
+            dim,
+            normals: (0..points).flat_map(point).collect(),
         }
     }
 
-    /// Writes the normal quantiles of a point.
-    fn normals(&self, k: usize, z: &mut [f64]) {
-        for (value, stride) in z.iter_mut().zip(&self.strides) {
-            // Off the first point, at which all coordinates are alike.
-            let cell = ((k + self.points / 3) * stride) % self.points;
-            *value = normal_quantile((cell as f64 + 0.5) / self.points as f64);
-        }
+    /// The coordinates of a point.
+    fn point(&self, k: usize) -> &[f64] {
+        &self.normals[k * self.dim..(k + 1) * self.dim]
     }
 }
 
-fn gcd(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { gcd(b, a % b) }
+/// Every number below `points` once, in the order of multiples of a step, modulo 1.
+fn permutation(points: usize, step: f64) -> Vec<usize> {
+    let places: Vec<f64> = (0..points)
+        .map(|k| ((k + 1) as f64 * step).fract())
+        .collect();
+    let before = |place: &f64| places.iter().filter(|other| *other < place).count();
+    places.iter().map(before).collect()
+}
+
+fn mean_product(a: &[f64], b: &[f64]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+    sum / a.len() as f64
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Lattice;
+    use super::{Lattice, mean_product, permutation, widening};
+    use crate::belief::gaussian::{even_steps, normal_quantile};
 
     #[test]
-    fn a_lattice_takes_every_value_of_every_coordinate_once() {
+    fn permutations_take_every_number_once() {
         for points in [1, 2, 20, 40, 97] {
-            let lattice = Lattice::new(points, 3);
-            for i in 0..3 {
-                let mut seen: Vec<f64> = (0..points)
-                    .map(|k| {
-                        let mut z = [0.0; 3];
-                        lattice.normals(k, &mut z);
-                        z[i]
-                    })
-                    .collect();
-                seen.sort_by(f64::total_cmp);
-                seen.dedup();
-                assert_eq!(seen.len(), points);
+            for step in even_steps(3) {
+                let mut cells = permutation(points, step);
+                cells.sort_unstable();
+                assert!(cells.into_iter().eq(0..points), "{points} points");
             }
         }
+    }
+
+    #[test]
+    fn points_of_a_lattice_have_the_moments_of_the_standard_normal() {
+        for (points, dim) in [(9, 2), (9, 3), (9, 4), (45, 2), (21, 5)] {
+            let lattice = Lattice::new(points, dim);
+            let column =
+                |i: usize| -> Vec<f64> { (0..points).map(|k| lattice.point(k)[i]).collect() };
+            let quantile = |k: usize| normal_quantile((k as f64 + 0.5) / points as f64);
+            let order: Vec<f64> = (0..points).map(quantile).collect();
+            for i in 0..dim {
+                let mean = mean_product(&column(i), &vec![1.0; points]);
+                assert!(mean.abs() < 1e-12, "{points} points: mean {mean}");
+                let with_order = mean_product(&column(i), &order);
+                assert!(with_order.abs() < 1e-12, "{points} points: {with_order}");
+                for j in 0..dim {
+                    let product = mean_product(&column(i), &column(j));
+                    let expected = f64::from(i == j);
+                    assert!(
+                        (product - expected).abs() < 1e-12,
+                        "{points} points: {product} of {i} and {j}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn so_few_medians_are_as_wide_as_a_normal_distribution_once_moved_apart() {
+        assert!((widening(2) - 1.0 / 0.6744897501960817).abs() < 1e-9);
+        assert!((widening(1001) - 1.0).abs() < 0.01);
+        assert_eq!(widening(1), 1.0);
     }
 }

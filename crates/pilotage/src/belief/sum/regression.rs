@@ -50,8 +50,15 @@ pub(super) fn regress(
 }
 
 impl Line {
-    /// The regression on the sigma points of a Gaussian in the frame; `None` where that has no width.
+    /// The regression on the sigma points of a Gaussian in the frame; `None` where that has no width. What is a line already needs none.
     fn new(sensor: &mut Sensor<'_>, frame: &Frame, around: &Inner) -> Option<Self> {
+        if let Some((h, noise)) = sensor.linear() {
+            return Some(Self {
+                a: frame.seen(h),
+                b: frame.middle_seen(h),
+                noise: Few::from_slice(noise),
+            });
+        }
         let (r, m) = (frame.rank, sensor.m);
         let spread = root(&around.covariance, r);
         if (0..r).any(|i| spread[i * r + i] <= 0.0) {

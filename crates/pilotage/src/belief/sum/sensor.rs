@@ -49,17 +49,29 @@ impl<'a> Sensor<'a> {
         self.doing.mode = mode;
     }
 
-    /// The numbers that were read, where they are not cut off at an end.
+    /// The numbers that were read, where none of them is cut off at an end.
     pub(super) fn numbers(&self) -> Option<&'a [f64]> {
         match self.reading {
-            Reading::Values(values) if self.dynamics.saturates().is_empty() => Some(values),
+            Reading::Values(values) if !self.is_cut_off(values) => Some(values),
             _ => None,
         }
+    }
+
+    fn is_cut_off(&self, read: &[f64]) -> bool {
+        let mut ends = self.dynamics.saturates().iter().zip(read);
+        ends.any(|(ends, read)| *read <= ends.low || *read >= ends.high)
     }
 
     /// Probability that there is a reading, where that is the same everywhere.
     pub(super) fn present(&self) -> Option<f64> {
         self.dynamics.constant_present(self.doing)
+    }
+
+    /// `H`, `m x n` row by row, and the covariance of the noise, where readings are linear and their noise the same everywhere.
+    pub(super) fn linear(&self) -> Option<(&'a [f64], &'a [f64])> {
+        let h = self.dynamics.linear_observation(self.doing)?;
+        let noise = self.dynamics.constant_observation_noise(self.doing)?;
+        Some((h, noise))
     }
 
     /// Asks what is read in a state, and with which noise.
@@ -94,8 +106,8 @@ impl<'a> Sensor<'a> {
     }
 
     fn log_density(&mut self, read: &[f64]) -> f64 {
-        let saturates = self.dynamics.saturates();
-        if !saturates.is_empty() {
+        if self.is_cut_off(read) {
+            let saturates = self.dynamics.saturates();
             let each = (0..self.m).map(|r| {
                 let (apart, variance) = (read[r] - self.values[r], self.noise[r * self.m + r]);
                 let sd = variance.max(LEAST).sqrt();

@@ -66,7 +66,7 @@ pub(in crate::solve) fn meet<K: Keeping>(
                 Then::End => break,
                 Then::Restart => (full, step) = (keeping.start(), 0),
                 Then::Continue => {
-                    keeping.act(&mut full, action, step);
+                    keeping.go_on(&mut full, action, step);
                     keeping.sense(&mut full, action, step, observation.reading());
                     step += 1;
                 }
