@@ -1,13 +1,18 @@
-//! Makes docs/benchmarks.md: what plans on beliefs in full promise and earn, on problems that others publish numbers for.
+//! Makes docs/benchmarks.md: what plans on beliefs in full promise and earn, on problems that others publish numbers for; or docs/gallery.md:
+//! the same of problems that people have.
 //!
 //! ```sh
 //! cargo run --release -p pilotage --example benchmarks -- --out docs/benchmarks.md [PROBLEM ...]
+//! cargo run --release -p pilotage --example benchmarks -- --gallery target/gallery --out docs/gallery.md [PROBLEM ...]
 //! ```
+//!
+//! The automata of the gallery are kept in the folder named; scripts/gallery.sh draws them too.
 //!
 //! Every problem is solved in a process of its own, so that time and memory are its own.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::error::Error;
+use std::path::Path;
 use std::process::Command;
 
 use pilotage::progress::Silent;
@@ -57,7 +62,8 @@ struct Published {
 /// What was measured of an automaton.
 #[derive(Serialize, Deserialize)]
 struct Row {
-    most: usize,
+    /// The most nodes that it may have, where that is limited.
+    most: Option<usize>,
     nodes: usize,
     planned: f64,
     earned: (f64, f64),
@@ -66,34 +72,52 @@ struct Row {
     /// Processor time of planning and compiling, all cores together.
     seconds: Option<f64>,
     mebibytes: Option<f64>,
+    remarks: Vec<String>,
+    /// The tree as nested conditions.
+    conditions: String,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let data: Data = toml::from_str(DATA)?;
     let mut arguments: Vec<String> = std::env::args().skip(1).collect();
-    if let [flag, name, most] = arguments.as_slice()
-        && flag == "--one"
-    {
-        println!("{}", serde_json::to_string(&measure(name, most.parse()?)?)?);
+    if let Some(name) = value_of("--one", &mut arguments) {
+        let most = value_of("--most", &mut arguments).map(|most| most.parse());
+        let keep = value_of("--keep", &mut arguments);
+        let row = measure(&name, most.transpose()?, keep.as_deref())?;
+        println!("{}", serde_json::to_string(&row)?);
         return Ok(());
     }
-    let out = match arguments.iter().position(|argument| argument == "--out") {
-        Some(place) if place + 1 < arguments.len() => {
-            arguments.remove(place);
-            Some(arguments.remove(place))
+    let out = value_of("--out", &mut arguments);
+    let folder = value_of("--gallery", &mut arguments);
+    let asked = |name: &str| arguments.is_empty() || arguments.iter().any(|other| other == name);
+    let mut page;
+    if let Some(folder) = folder {
+        std::fs::create_dir_all(&folder)?;
+        page = gallery_heading();
+        for name in scenario::gallery_names().filter(|name| asked(name)) {
+            page += &exhibit(name, &folder)?;
         }
-        _ => None,
-    };
-    let asked = |problem: &&Problem| arguments.is_empty() || arguments.contains(&problem.name);
-    let mut page = heading();
-    for problem in data.problem.iter().filter(asked) {
-        page += &section(problem)?;
+    } else {
+        let data: Data = toml::from_str(DATA)?;
+        page = heading();
+        for problem in data.problem.iter().filter(|problem| asked(&problem.name)) {
+            page += &section(problem)?;
+        }
     }
     match out {
         Some(path) => std::fs::write(path, page)?,
         None => println!("{page}"),
     }
     Ok(())
+}
+
+/// Takes a flag and its value out of the arguments.
+fn value_of(flag: &str, arguments: &mut Vec<String>) -> Option<String> {
+    let place = arguments.iter().position(|argument| argument == flag)?;
+    if place + 1 >= arguments.len() {
+        return None;
+    }
+    arguments.remove(place);
+    Some(arguments.remove(place))
 }
 
 fn heading() -> String {
@@ -108,19 +132,52 @@ fn heading() -> String {
     )
 }
 
+fn gallery_heading() -> String {
+    format!(
+        "# Gallery\n\n\
+         Problems that people have, each a model file in [models/gallery](../models/gallery) with a rule of thumb that an engineer would write. Each is solved as \
+         `pilotage solve NAME` does, nothing set. *Earned* is the discounted return of the automaton where the model holds, mean ± standard error over {EPISODES} \
+         episodes; the rule acts on the same belief in the same episodes. Where what was planned misses what is earned, the remark says why. Maps show what the \
+         automaton does: the mean of the belief across and up, how sure it is in the panels. Version {}, seed {SEED}; made by\n\n\
+         ```sh\nscripts/gallery.sh\n```\n",
+        env!("CARGO_PKG_VERSION")
+    )
+}
+
+/// Trees of more nodes are not written out.
+const WRITTEN_OUT: usize = 12;
+
+/// Measures a problem of the gallery, and keeps its automaton in a folder.
+fn exhibit(name: &str, folder: &str) -> Result<String, Box<dyn Error>> {
+    let model = scenario::find(name)?.model;
+    let row = in_its_own_process(name, None, Some(&format!("{folder}/{name}.json")))?;
+    let mut text = format!(
+        "\n## `{name}`\n\n{}\n\n![What the automaton of {name} does](images/gallery/{name}-map.svg)\n\n{HEAD}{}",
+        model.about,
+        row.line(usual_digits())
+    );
+    for remark in &row.remarks {
+        text += &format!("\nRemark: {remark}.\n");
+    }
+    if row.nodes <= WRITTEN_OUT {
+        text += &format!("\n```text\n{}\n```\n", row.conditions.trim_end());
+    }
+    Ok(text)
+}
+
 /// Measures a problem in processes of its own.
 fn section(problem: &Problem) -> Result<String, Box<dyn Error>> {
     let model = scenario::find(&problem.name)?.model;
     let mut text = format!("\n## `{}`\n\n{}\n\n", problem.name, model.about);
     text += HEAD;
     for most in &problem.nodes {
-        text += &in_its_own_process(&problem.name, *most)?.line(problem.digits);
+        text += &in_its_own_process(&problem.name, Some(*most), None)?.line(problem.digits);
     }
     if problem.told {
-        let most = problem.nodes.iter().copied().max().unwrap_or(1);
+        let most = problem.nodes.iter().copied().max();
         let starts = 1..=model.start.len();
         let rows: Result<Vec<Row>, _> = starts
-            .map(|start| in_its_own_process(&format!("{}@{start}", problem.name), most))
+            .map(|start| in_its_own_process(&format!("{}@{start}", problem.name), most, None))
             .collect();
         text += &told(&rows?, problem.digits);
     }
@@ -150,12 +207,27 @@ fn told(rows: &[Row], digits: usize) -> String {
     )
 }
 
-/// Measures a problem in a process of its own.
-fn in_its_own_process(name: &str, most: usize) -> Result<Row, Box<dyn Error>> {
-    eprintln!("{name}, at most {most} nodes");
-    let program = std::env::current_exe()?;
-    let run = Command::new(program)
-        .args(["--one", name, &most.to_string()])
+/// Measures a problem in a process of its own, which keeps the automaton in a file where one is named.
+fn in_its_own_process(
+    name: &str,
+    most: Option<usize>,
+    keep: Option<&str>,
+) -> Result<Row, Box<dyn Error>> {
+    let limit = most.map(|most| most.to_string());
+    eprintln!(
+        "{name}, {} nodes",
+        limit.as_deref().unwrap_or("any number of")
+    );
+    let flags = [
+        ("--one", Some(name)),
+        ("--most", limit.as_deref()),
+        ("--keep", keep),
+    ];
+    let given = flags
+        .into_iter()
+        .filter_map(|(flag, value)| Some([flag, value?]));
+    let run = Command::new(std::env::current_exe()?)
+        .args(given.flatten())
         .output()?;
     if !run.status.success() {
         return Err(format!("{name}: {}", String::from_utf8_lossy(&run.stderr)).into());
@@ -168,7 +240,8 @@ impl Row {
         let estimate = |(mean, stderr): (f64, f64)| format!("{mean:.digits$} ± {stderr:.digits$}");
         format!(
             "| {} | {} | {} | {:.digits$} | {} | {} | {} | {} |\n",
-            self.most,
+            self.most
+                .map_or_else(|| "-".to_owned(), |most| most.to_string()),
             self.nodes,
             self.solver,
             self.planned,
@@ -184,13 +257,13 @@ fn whole(number: Option<f64>) -> String {
     number.map_or_else(|| "-".to_owned(), |number| format!("{number:.0}"))
 }
 
-/// Solves a problem with the first planner for it, and runs what it found.
-fn measure(name: &str, most: usize) -> Result<Row, Box<dyn Error>> {
+/// Solves a problem with the first planner for it, and runs what it found. Where nodes are limited, no return may be lost by fewer.
+fn measure(name: &str, most: Option<usize>, keep: Option<&str>) -> Result<Row, Box<dyn Error>> {
     let scenario = scenario::find(name)?;
     let entry = *Registry::builtin().first_for(&scenario.model)?;
     let request = Request {
-        nodes: Some(most),
-        loss: Some(0.0),
+        nodes: most,
+        loss: most.map(|_| 0.0),
         seed: SEED,
         ..Request::form(Form::Tree)
     };
@@ -202,17 +275,21 @@ fn measure(name: &str, most: usize) -> Result<Row, Box<dyn Error>> {
     };
     let earned = solution.earned(&scenario, options, &Silent)?;
     let pair = |estimate: pilotage::simulate::Estimate| (estimate.mean, estimate.stderr);
+    let automaton = solution.automaton();
+    if let (Some(path), Some(automaton)) = (keep, automaton) {
+        automaton.save(Path::new(path))?;
+    }
     Ok(Row {
         most,
-        nodes: solution
-            .automaton()
-            .map_or(0, |automaton| automaton.nodes.len()),
+        nodes: automaton.map_or(0, |automaton| automaton.nodes.len()),
         planned: solution.planned_value.unwrap_or(f64::NAN),
         earned: pair(earned.assumed.discounted),
         rule: earned.rule.map(|rule| pair(rule.discounted)),
         solver: entry.name().to_owned(),
         seconds,
         mebibytes: peak(),
+        remarks: earned.remarks,
+        conditions: automaton.map_or_else(String::new, |automaton| automaton.conditions()),
     })
 }
 
