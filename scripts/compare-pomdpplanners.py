@@ -1,11 +1,13 @@
-"""Returns of POMDPPlanners' PFT-DPW and POMCPOW on two light-dark problems, beside a hand rule.
+"""Returns of POMDPPlanners' PFT-DPW and POMCPOW on two light-dark problems, beside a hand rule and the automata of pilotage.
 
     pip install -r scripts/compare-pomdpplanners.txt
-    python3 scripts/compare-pomdpplanners.py --out docs/data/pomdpplanners.json
+    cargo build --release
+    python3 scripts/compare-pomdpplanners.py --pilotage target/release/pilotage --out docs/data/pomdpplanners.json
 
 Prints a Markdown table and writes the same numbers, with every episode's return, as JSON. All methods keep the package's weighted particle
-belief and meet the same worlds: start and noise of the readings come from a generator of the episode, the search from another. Returns are
-the same for the same seed; times are not.
+belief and meet the same worlds: start and noise of the readings come from a generator of the episode, the search from another. Automata are
+planned before, for the same problems as model files say them, run in worlds of their own, and keep their own belief; their time for a decision
+has the belief and the world in it. Returns are the same for the same seed; times are not.
 """
 
 import argparse
@@ -15,7 +17,9 @@ import math
 import os
 import platform
 import random
+import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -42,6 +46,10 @@ STEPS = 100
 RULE_DEVIATION = 0.5
 DEPTH = 20
 ACTION_WIDENING = {"k_a": 2, "alpha_a": 0}
+MODELS = {"LD(5)": "light-dark-5", "LD(10)": "light-dark-10"}
+"""Built-in problems of pilotage that are the same, automata of at most `NODES` nodes for which are run for so many episodes."""
+NODES = 30
+EPISODES = 20_000
 PLANNERS = {"PFT-DPW": PFT_DPW, "POMCPOW": POMCPOW}
 SETTINGS = {
     "PFT-DPW": {"exploration_share": 1.0, "k_o": 4, "alpha_o": 1 / 10},
@@ -280,6 +288,37 @@ def summary(problem, method, simulations, episodes):
     }
 
 
+def automaton(problem, arguments):
+    """A row of the table: an automaton of pilotage, on one thread."""
+    with tempfile.TemporaryDirectory() as folder:
+        policy = os.path.join(folder, "policy.json")
+        common = ["--seed", str(arguments.seed), "--threads", "1", "--json"]
+        size = ["--nodes", str(NODES), "--loss", "0", "--episodes", "100", "--out", policy]
+        solved = told(arguments.pilotage, "solve", MODELS[problem.name], *size, *common)
+        ran = told(arguments.pilotage, "simulate", MODELS[problem.name], "--policy", policy, "--episodes", str(EPISODES), *common)
+    evaluation = ran["evaluation"]
+    decisions = round(EPISODES * evaluation["steps"]["mean"])
+    milliseconds = 1e3 * ran["seconds"]["evaluate"] / decisions
+    return {
+        "problem": problem.name,
+        "method": f"pilotage {ran['pilotage']}, {ran['nodes']} nodes",
+        "simulations": None,
+        "episodes": EPISODES,
+        "mean": evaluation["discounted"]["mean"],
+        "standard_error": evaluation["discounted"]["stderr"],
+        "stopped": None,
+        "decisions": decisions,
+        "wall_milliseconds_per_decision": milliseconds,
+        "cpu_milliseconds_per_decision": milliseconds,
+        "seconds_to_plan": solved["seconds"]["solve"],
+    }
+
+
+def told(*command):
+    """What a program says as JSON."""
+    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL).stdout)
+
+
 def markdown(report):
     """The report as a table below a line on how it came about."""
     lines = [
@@ -290,7 +329,7 @@ def markdown(report):
         "|---|---|--:|--:|--:|--:|--:|",
     ]
     for row in report["results"]:
-        stopped = " / ".join(str(count) for count in row["stopped"].values())
+        stopped = " / ".join(str(count) for count in row["stopped"].values()) if row["stopped"] else ""
         lines.append(
             f"| {row['problem']} | {row['method']} | {row['simulations'] or ''} | {row['mean']:.2f} ± {row['standard_error']:.2f} "
             f"| {stopped} | {row['cpu_milliseconds_per_decision']:.3g} | {row['wall_milliseconds_per_decision']:.3g} |"
@@ -314,6 +353,7 @@ def read_arguments():
         "--simulations", type=positive, nargs="+", default=[100, 1000], metavar="N", help="budgets of the search (default 100 1000)"
     )
     parser.add_argument("--seed", type=int, default=1, help="0 or more (default 1)")
+    parser.add_argument("--pilotage", metavar="PROGRAM", help="the program whose automata are run too")
     parser.add_argument("--out", metavar="FILE", help="where to write the JSON")
     arguments = parser.parse_args()
     if arguments.episodes < 2 or arguments.seed < 0:
@@ -326,6 +366,8 @@ def main():
     logging.disable(logging.INFO)  # The package tells of every environment that is made.
     results = []
     for problem in PROBLEMS:
+        if arguments.pilotage:
+            results.append(automaton(problem, arguments))
         for method, simulations, make_policy in methods(arguments.simulations):
             began = time.perf_counter()
             row = summary(problem, method, simulations, evaluate(problem, make_policy, arguments))

@@ -69,7 +69,7 @@ fn codebook() -> CodebookPlanner {
     CodebookPlanner {
         strata: Some(30),
         points: Some(65),
-        rounds: Some(2),
+        rounds: 2,
         episodes: 60,
         refined: Some(300),
         ..CodebookPlanner::default()

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use crate::belief::{Belief, Codebook, Held, Moments};
 use crate::model::ActionId;
 use crate::policy::{Policy, first_best};
-use crate::solve::grid::Grid;
+
+use super::means::Means;
 
 /// Values of all actions on a grid of means, for every stratum. A belief in full lies between several strata, one that is read is of one.
 #[derive(Debug, Clone)]
 pub struct GridValues {
-    grid: Grid,
+    means: Means,
     codebook: Arc<Codebook>,
     /// By action and stratum: a value for every point of the grid.
     values: Vec<Vec<f64>>,
@@ -19,8 +20,13 @@ pub struct GridValues {
 
 impl GridValues {
     /// Of values by stratum, point and action.
-    pub(super) fn new(grid: Grid, codebook: Arc<Codebook>, found: &[f64], actions: usize) -> Self {
-        let (points, strata) = (grid.len(), codebook.len());
+    pub(super) fn new(
+        means: Means,
+        codebook: Arc<Codebook>,
+        found: &[f64],
+        actions: usize,
+    ) -> Self {
+        let (points, strata) = (means.grid.len(), codebook.len());
         let of = |action: usize, stratum: usize| {
             let at = move |point: usize| (stratum * points + point) * actions + action;
             (0..points).map(|point| found[at(point)]).collect()
@@ -30,7 +36,7 @@ impl GridValues {
                 .flat_map(|action| (0..strata).map(move |stratum| (action, stratum)))
                 .map(|(action, stratum)| of(action, stratum))
                 .collect(),
-            grid,
+            means,
             codebook,
             actions,
         }
@@ -39,7 +45,7 @@ impl GridValues {
     /// What every action is worth at a belief of these moments, of which its plan was made: between strata and between points.
     pub(super) fn values_between(&self, moments: &Moments) -> Vec<f64> {
         let strata = self.codebook.between(moments, &mut Vec::new());
-        let around = self.grid.around(&moments.mean);
+        let around = self.means.around(&moments.mean);
         let value = |action: usize| -> f64 {
             let of = |&(stratum, weight): &(usize, f64)| {
                 let values = self.of(action, stratum);
@@ -62,7 +68,8 @@ impl GridValues {
 
     fn worth(&self, belief: &Belief, action: ActionId) -> f64 {
         let values = self.of(action, belief.stratum);
-        self.grid.interpolate(values, &belief.mean)
+        let around = self.means.around(&belief.mean).into_iter();
+        around.map(|(point, part)| part * values[point]).sum()
     }
 
     fn best(&self, belief: &Belief) -> (ActionId, f64) {

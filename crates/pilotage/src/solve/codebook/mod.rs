@@ -13,6 +13,7 @@
 //! The round that earns most in the world that the model assumes is kept.
 
 mod grid_values;
+mod means;
 mod meet;
 mod rows;
 
@@ -34,6 +35,7 @@ use crate::progress::Progress;
 use crate::scenario::Scenario;
 use crate::simulate::{Options, evaluate};
 pub use grid_values::GridValues;
+use means::Means;
 use meet::Met;
 pub(super) use meet::meet;
 use rows::Rows;
@@ -53,9 +55,8 @@ pub struct CodebookPlanner {
     pub points: Option<usize>,
     /// Readings that are thought of after an action; at least 1.
     pub readings: usize,
-    /// Times that the plan is refined on the beliefs that it meets; at least 1, or `auto` for 3 where a step of a belief takes little time and
-    /// 2 elsewhere.
-    pub rounds: Option<usize>,
+    /// Times that the plan is refined on the beliefs that it meets; at least 1.
+    pub rounds: usize,
     /// Episodes that are run to meet beliefs in a round; at least 1, at most a million.
     pub episodes: usize,
     /// Most beliefs in full that a round refines on; at least 0, or `auto` for 4000 where a step of a belief takes little time and 1000
@@ -72,7 +73,7 @@ impl Default for CodebookPlanner {
             apart: 0.12,
             points: None,
             readings: 9,
-            rounds: None,
+            rounds: 3,
             episodes: 200,
             refined: None,
             tolerance: 1e-6,
@@ -88,8 +89,7 @@ impl Settings for CodebookPlanner {
         let points = self.points.unwrap_or(2);
         ensure("points", points, points >= 2, "at least 2")?;
         ensure("readings", self.readings, self.readings >= 1, "at least 1")?;
-        let rounds = self.rounds.unwrap_or(1);
-        ensure("rounds", rounds, rounds >= 1, "at least 1")?;
+        ensure("rounds", self.rounds, self.rounds >= 1, "at least 1")?;
         super::rollout::check_runs("episodes", self.episodes)?;
         ensure("tolerance", self.tolerance, self.tolerance > 0.0, "above 0")
     }
@@ -217,7 +217,7 @@ impl<'a, K: Keeping> Course<'a, K> {
         let planned = rows.worth(keeping, &self.codebook, &found, model.discount, planner);
         let codebook = Arc::new(self.codebook.clone());
         let actions = model.actions.len();
-        let values = GridValues::new(rows.grid.clone(), Arc::clone(&codebook), &found, actions);
+        let values = GridValues::new(rows.means.clone(), Arc::clone(&codebook), &found, actions);
         let coded = Coded::new(model, Arc::clone(&self.keeping), Arc::clone(&codebook));
         let updater = (self.updater)(coded);
         let earned = self.earned(&values, &updater);
@@ -242,16 +242,21 @@ impl<'a, K: Keeping> Course<'a, K> {
         let (apart, most) = (self.planner.apart, self.size.strata_of(round));
         let added = self.codebook.cover(&moments, apart, most).into_iter();
         self.shapes.extend(added.map(|i| self.met[i].full.clone()));
-        let reaches = |rows: &Rows| moments.iter().all(|met| rows.grid.contains(&met.mean));
+        let reaches = |rows: &Rows| {
+            moments
+                .iter()
+                .all(|met| rows.means.grid.contains(&met.mean))
+        };
         let earlier = self.earlier.take().filter(reaches);
-        let known = earlier.as_ref().map(|rows| rows.grid.clone());
-        let grid = known.unwrap_or_else(|| grid(self.model, &moments, &self.points));
+        let known = earlier.as_ref().map(|rows| rows.means.clone());
+        let made = || Means::new(self.model, grid(self.model, &moments, &self.points));
+        let means = known.unwrap_or_else(made);
         let coarse = self.keeping.coarse();
         let keeping = self.keeping.as_ref();
         Rows::new(
             (keeping, coarse.as_ref().unwrap_or(keeping)),
             (&self.codebook, self.shapes.as_slice()),
-            (grid, self.model.episode.length),
+            (means, self.model.episode.length),
             &self.met,
             (self.size.refined, self.planner.readings),
             (self.plan.as_ref(), earlier),
@@ -330,7 +335,7 @@ impl CodebookPlanner {
         let or = |set: Option<usize>, quick, slow| set.unwrap_or(if light { quick } else { slow });
         Size {
             strata: or(self.strata, 120, 40),
-            rounds: or(self.rounds, 3, 2),
+            rounds: self.rounds,
             refined: or(self.refined, 4000, 1000),
         }
     }
@@ -340,9 +345,9 @@ impl CodebookPlanner {
         let n = model.state_dim();
         let points = self.points.unwrap_or(match n {
             1 => 201,
-            2 => 33,
-            3 => 15,
-            _ => 9,
+            2 => 17,
+            3 => 9,
+            _ => 7,
         });
         vec![points; n]
     }

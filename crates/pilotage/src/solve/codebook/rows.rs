@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::means::Means;
 use super::meet::Met;
 use super::{CodebookPlanner, GridValues};
 use crate::belief::{Codebook, Keeping, Moments};
 use crate::parallel;
 use crate::policy::first_best;
-use crate::solve::grid::Grid;
 
 /// What an action is expected to do at a state: a stratum and a point of the grid.
 #[derive(Debug, Clone, Default)]
@@ -28,7 +28,7 @@ enum State {
 
 /// What is known of all states.
 pub(super) struct Rows {
-    pub grid: Grid,
+    pub means: Means,
     /// Steps of an episode.
     length: usize,
     states: Vec<State>,
@@ -48,7 +48,7 @@ const SWEEPS: usize = 5000;
 /// Reads beliefs as states.
 struct Reader<'a> {
     codebook: &'a Codebook,
-    grid: &'a Grid,
+    means: &'a Means,
     /// Steps of an episode.
     length: usize,
 }
@@ -56,8 +56,8 @@ struct Reader<'a> {
 impl Reader<'_> {
     /// The states that a belief lies between, with weights that sum to 1.
     fn states(&self, moments: &Moments, code: &mut Vec<f64>, to: &mut Vec<(u32, f64)>, share: f64) {
-        let points = self.grid.len();
-        let around = self.grid.around(&moments.mean);
+        let points = self.means.grid.len();
+        let around = self.means.around(&moments.mean);
         for (stratum, weight) in self.codebook.between(moments, code) {
             for (point, part) in &around {
                 to.push(((stratum * points + point) as u32, share * weight * part));
@@ -67,7 +67,7 @@ impl Reader<'_> {
 
     /// Which states beliefs that were met lie between.
     fn near<F>(&self, met: &[Met<F>]) -> Vec<bool> {
-        let mut near = vec![false; self.codebook.len() * self.grid.len()];
+        let mut near = vec![false; self.codebook.len() * self.means.grid.len()];
         let (mut code, mut states) = (Vec::new(), Vec::new());
         for met in met {
             states.clear();
@@ -154,18 +154,19 @@ impl Rows {
     pub(super) fn new<K: Keeping>(
         (keeping, coarse): (&K, &K),
         (codebook, shapes): (&Codebook, &[K::Full]),
-        (grid, length): (Grid, usize),
+        (means, length): (Means, usize),
         met: &[Met<K::Full>],
         (most, readings): (usize, usize),
         (plan, earlier): (Option<&GridValues>, Option<Self>),
     ) -> Self {
         let reader = Reader {
             codebook,
-            grid: &grid,
+            means: &means,
             length,
         };
         let actions = keeping.actions();
-        let (points, states) = (grid.len(), codebook.len() * grid.len());
+        let points = means.grid.len();
+        let states = codebook.len() * points;
         let refined = refined::<K>(&reader, met, most);
         let near = reader.near(met);
         let kept = |state: usize| {
@@ -179,7 +180,7 @@ impl Rows {
             if kept(state) {
                 return None;
             }
-            let mean = grid.point(state % points);
+            let mean = means.grid.point(state % points);
             let stratum = codebook.stratum(state / points);
             if let Some(plan) = plan.filter(|_| !near[state]) {
                 return Some(State::Worth(plan.values_between(&stratum.at(mean))));
@@ -222,7 +223,7 @@ impl Rows {
             actions,
             start: merged(start),
             refined: refined.into_keys().collect(),
-            grid,
+            means,
             length,
         }
     }
@@ -281,14 +282,14 @@ impl Rows {
     /// point is left out a point itself says it; lines half as long are off by a quarter of that.
     pub(super) fn bends<F>(&self, codebook: &Codebook, found: &[f64], met: &[Met<F>]) -> Vec<f64> {
         let values = self.best(found);
-        let mut bends = vec![0.0; self.grid.axes().len()];
+        let mut bends = vec![0.0; self.means.grid.axes().len()];
         let mut code = Vec::new();
         for met in met {
             let stratum = codebook.nearest(&met.moments, &mut code);
-            let point = self.grid.nearest(&met.moments.mean);
-            let at = |point: usize| values[stratum * self.grid.len() + point];
+            let point = self.means.grid.nearest(&met.moments.mean);
+            let at = |point: usize| values[stratum * self.means.grid.len() + point];
             for (axis, bend) in bends.iter_mut().enumerate() {
-                if let Some([before, after]) = self.grid.beside(point, axis) {
+                if let Some([before, after]) = self.means.grid.beside(point, axis) {
                     *bend += 0.25 * (at(point) - 0.5 * (at(before) + at(after))).abs();
                 }
             }
@@ -319,7 +320,7 @@ impl Rows {
     ) -> f64 {
         let reader = Reader {
             codebook,
-            grid: &self.grid,
+            means: &self.means,
             length: self.length,
         };
         let values = match discount.powi(self.length as i32) > NOTHING {
@@ -356,9 +357,9 @@ fn refined<K: Keeping>(
     let mut code = Vec::new();
     for (i, met) in met.iter().enumerate().step_by(stride) {
         let stratum = reader.codebook.nearest(&met.moments, &mut code);
-        let point = reader.grid.nearest(&met.moments.mean);
+        let point = reader.means.grid.nearest(&met.moments.mean);
         let fulls = refined
-            .entry(stratum * reader.grid.len() + point)
+            .entry(stratum * reader.means.grid.len() + point)
             .or_default();
         if fulls.len() < SHARED {
             fulls.push(i);
