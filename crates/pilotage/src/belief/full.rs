@@ -85,7 +85,7 @@ pub trait Keeping: Send + Sync {
     }
 
     /// Readings that may come after an action at a step, of which `full` is the result, with probabilities that sum to 1: every signal of
-    /// a discrete sensor, `most` evenly spread readings otherwise, and that there is none where it may be missing.
+    /// a discrete sensor, about `most` evenly spread readings otherwise, and that there is none where it may be missing.
     fn readings(
         &self,
         full: &Self::Full,

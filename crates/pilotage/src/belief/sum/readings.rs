@@ -8,7 +8,7 @@ use super::{Sum, SumKeeping};
 use crate::belief::full::Sensed;
 use crate::belief::gaussian::{even_steps, normal_quantile};
 use crate::belief::reading::Reading;
-use crate::model::{ActionId, ModeId};
+use crate::model::ActionId;
 
 impl SumKeeping {
     pub(super) fn spread_readings(
@@ -24,7 +24,8 @@ impl SumKeeping {
         }
     }
 
-    /// Readings that are equally likely, of so many at most.
+    /// About so many readings: those of a mode are equally likely, and as likely together as it is. Were modes heard out of proportion, those
+    /// heard too often would seem to become more likely by themselves.
     fn numbers(
         &self,
         full: &Sum,
@@ -32,64 +33,103 @@ impl SumKeeping {
         step: usize,
         most: usize,
     ) -> Vec<(f64, Sensed)> {
-        let points = match self.dynamics.readings() {
-            1 => FINER * most,
-            _ => most,
-        };
-        // Medians leave out what is beyond them.
-        let wider = if points > most { widening(most) } else { 1.0 };
-        let (mut drawn, missing) = self.draw(full, action, step, (points.max(1), wider));
-        if self.dynamics.readings() == 1 {
-            drawn = evenly(drawn, most);
+        let mut weights = vec![0.0; self.dynamics.modes()];
+        for component in &full.components {
+            weights[component.mode] += component.weight;
         }
-        let mode = |point: &Drawn| self.model.laws.modes_seen.then_some(point.mode as f64);
-        let sensed = drawn.into_iter().map(|mut point| {
-            let mode = mode(&point);
-            point.values.extend(mode);
-            (point.likely, Sensed::Values(point.values))
-        });
-        let mut readings: Vec<(f64, Sensed)> = sensed.collect();
+        let heaviest = weights.iter().copied().fold(0.0, f64::max);
+        let count = |&weight: &f64| match weight {
+            rare if rare < RARE * heaviest => 0,
+            sure if sure > 1.0 - RARE => most.max(1),
+            weight => ((most as f64 * weight).round() as usize).max(SEVERAL),
+        };
+        let counts: Vec<usize> = weights.iter().map(count).collect();
+        let total: usize = counts.iter().sum();
+        // Single numbers can be put in order, and are the medians of more.
+        let finer = match self.dynamics.readings() {
+            1 => FINER,
+            _ => 1,
+        };
+        let lattice = Lattice::new(
+            finer * total,
+            self.dynamics.states() + self.dynamics.readings(),
+        );
+        let mut draw = Draw {
+            sensor: Sensor::new(self, action, step, Reading::Nothing),
+            points: lattice.points(),
+            wider: 1.0,
+        };
+        let mut readings = Vec::with_capacity(total + 1);
+        let mut missing = 0.0;
+        for (mode, (&weight, &count)) in weights.iter().zip(&counts).enumerate() {
+            let of_mode = |component: &&Component| component.mode == mode;
+            let components: Vec<&Component> = full.components.iter().filter(of_mode).collect();
+            if finer > 1 {
+                draw.wider = widening(count);
+            }
+            let (mut drawn, gone) = self.draw(&components, weight, finer * count, &mut draw);
+            missing += gone;
+            if finer > 1 {
+                drawn = evenly(drawn, count);
+            }
+            let seen = self.model.laws.modes_seen.then_some(mode as f64);
+            readings.extend(drawn.into_iter().map(|mut point| {
+                point.values.extend(seen);
+                (point.likely, Sensed::Values(point.values))
+            }));
+        }
         if missing > NEVER {
             readings.push((missing, Sensed::Nothing));
+        }
+        let total: f64 = readings.iter().map(|(likely, _)| likely).sum();
+        for (likely, _) in &mut readings {
+            *likely /= total;
         }
         readings
     }
 
-    /// Points of the sum, each with a point of the noise, and how likely it is that there is no reading. Shares of the sum, in the order of
-    /// its components, are equal; within them and of the noise, numbers follow a [`Lattice`], so many times as wide.
-    fn draw(
+    /// So many points of components of a mode, each with a point of the noise, and how likely it is that there is no reading. Shares of the
+    /// components, in their order, are equal; within them and of the noise, numbers follow a [`Lattice`] that all modes have a part in.
+    fn draw<'l>(
         &self,
-        full: &Sum,
-        action: ActionId,
-        step: usize,
-        (points, wider): (usize, f64),
+        components: &[&Component],
+        weight: f64,
+        points: usize,
+        draw: &mut Draw<'_, impl Iterator<Item = &'l [f64]>>,
     ) -> (Vec<Drawn>, f64) {
         let (n, m) = (self.dynamics.states(), self.dynamics.readings());
-        let lattice = Lattice::new(points, n + m);
+        let Draw {
+            sensor,
+            points: normals,
+            wider,
+        } = draw;
         let mut drawn = Vec::with_capacity(points);
         let (mut at, mut z) = (vec![0.0; n], vec![0.0; n + m]);
-        let mut sensor = Sensor::new(self, action, step, Reading::Nothing);
         let mut spread = vec![0.0; m * m];
         let mut missing = 0.0;
-        let share = 1.0 / points as f64;
+        let share = weight / points as f64;
         let (mut passed, mut k) = (0.0, 0);
-        for (i, component) in full.components.iter().enumerate() {
+        for (i, component) in components.iter().enumerate() {
             let before = passed;
             passed += component.weight;
             // Rounding may leave the last a little short.
-            let last = i + 1 == full.components.len();
-            let end = if last { 1.0 } else { passed };
+            let last = i + 1 == components.len();
+            let end = if last { weight } else { passed };
             let mut own = None;
             let in_order = widening((component.weight / share).round() as usize);
             while k < points && (k as f64 + 0.5) * share <= end {
-                z.copy_from_slice(lattice.point(k));
+                let Some(normal) = normals.next() else {
+                    break;
+                };
+                z.copy_from_slice(normal);
                 if component.weight >= share {
                     let within = ((k as f64 + 0.5) * share - before) / component.weight;
-                    let within = within.clamp(0.5 * share, 1.0 - 0.5 * share);
+                    let edge = 0.5 / points as f64;
+                    let within = within.clamp(edge, 1.0 - edge);
                     z[0] = in_order * normal_quantile(within);
                 }
                 for z in &mut z {
-                    *z *= wider;
+                    *z *= *wider;
                 }
                 k += 1;
                 let own = own.get_or_insert_with(|| root(&component.covariance, n));
@@ -114,7 +154,6 @@ impl SumKeeping {
                 }
                 drawn.push(Drawn {
                     likely: share * present,
-                    mode: component.mode,
                     values,
                 });
             }
@@ -173,12 +212,26 @@ impl SumKeeping {
     }
 }
 
+/// What readings are drawn with.
+struct Draw<'a, P> {
+    sensor: Sensor<'a>,
+    /// Points of a lattice that are left.
+    points: P,
+    /// Times as wide as they are.
+    wider: f64,
+}
+
 /// A reading that was drawn.
 struct Drawn {
     likely: f64,
-    mode: ModeId,
     values: Vec<f64>,
 }
+
+/// Modes that are so many times less likely than the likeliest are not heard.
+const RARE: f64 = 5e-3;
+
+/// Readings of a mode at least, where there are others.
+const SEVERAL: usize = 2;
 
 /// So many times as many numbers are drawn as are wanted, where they can be put in order.
 const FINER: usize = 5;
@@ -198,11 +251,7 @@ fn widening(points: usize) -> f64 {
 
 /// Of readings of one number, so many that are equally likely: the medians of those in between.
 fn evenly(mut drawn: Vec<Drawn>, most: usize) -> Vec<Drawn> {
-    drawn.sort_by(|a, b| {
-        a.mode
-            .cmp(&b.mode)
-            .then(a.values[0].total_cmp(&b.values[0]))
-    });
+    drawn.sort_by(|a, b| a.values[0].total_cmp(&b.values[0]));
     let total: f64 = drawn.iter().map(|point| point.likely).sum();
     let share = total / most as f64;
     let (mut kept, mut passed) = (Vec::with_capacity(most), 0.0);
@@ -267,9 +316,9 @@ impl Lattice {
         }
     }
 
-    /// The coordinates of a point.
-    fn point(&self, k: usize) -> &[f64] {
-        &self.normals[k * self.dim..(k + 1) * self.dim]
+    /// The coordinates of each point.
+    fn points(&self) -> impl Iterator<Item = &[f64]> {
+        self.normals.chunks_exact(self.dim)
     }
 }
 
@@ -289,8 +338,12 @@ fn mean_product(a: &[f64], b: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Sum, SumKeeping};
     use super::{Lattice, mean_product, permutation, widening};
+    use crate::belief::Keeping;
+    use crate::belief::full::Moments;
     use crate::belief::gaussian::{even_steps, normal_quantile};
+    use crate::scenario::find;
 
     #[test]
     fn permutations_take_every_number_once() {
@@ -308,7 +361,7 @@ mod tests {
         for (points, dim) in [(9, 2), (9, 3), (9, 4), (45, 2), (21, 5)] {
             let lattice = Lattice::new(points, dim);
             let column =
-                |i: usize| -> Vec<f64> { (0..points).map(|k| lattice.point(k)[i]).collect() };
+                |i: usize| -> Vec<f64> { lattice.points().map(|point| point[i]).collect() };
             let quantile = |k: usize| normal_quantile((k as f64 + 0.5) / points as f64);
             let order: Vec<f64> = (0..points).map(quantile).collect();
             for i in 0..dim {
@@ -326,6 +379,36 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Four rooms in which a telephone may ring, one of them more likely, and a reading that hardly tells: the average over readings is what was
+    /// believed before.
+    #[test]
+    fn modes_do_not_become_more_likely_by_themselves() {
+        let model = find("rooms").expect("a built-in problem").model;
+        let keeping = SumKeeping::new(&model);
+        let mut full = keeping.start();
+        for (component, weight) in full.components.iter_mut().zip([0.55, 0.3, 0.1, 0.05]) {
+            component.weight = weight;
+        }
+        let before = weights(&keeping, &full);
+        let mut after = vec![0.0; 4];
+        for (likely, sensed) in keeping.readings(&full, 0, 0, 9) {
+            let mut told = full.clone();
+            keeping.sense(&mut told, 0, 0, sensed.reading());
+            for (sum, weight) in after.iter_mut().zip(weights(&keeping, &told)) {
+                *sum += likely * weight;
+            }
+        }
+        for (before, after) in before.iter().zip(&after) {
+            assert!((before - after).abs() < 0.01, "{before} became {after}");
+        }
+    }
+
+    fn weights(keeping: &SumKeeping, full: &Sum) -> Vec<f64> {
+        let mut moments = Moments::default();
+        keeping.moments(full, &mut moments);
+        moments.weights
     }
 
     #[test]
