@@ -27,6 +27,9 @@ const DATA: &str = include_str!("../../../docs/data/benchmarks.toml");
 /// Episodes by which everything is measured.
 const EPISODES: usize = 20_000;
 
+/// Episodes by which problems of the gallery are measured.
+const GALLERY_EPISODES: usize = 10_000;
+
 const SEED: u64 = 1;
 
 #[derive(Deserialize)]
@@ -136,7 +139,7 @@ fn gallery_heading() -> String {
     format!(
         "# Gallery\n\n\
          Problems that people have, each a model file in [models/gallery](../models/gallery) with a rule of thumb that an engineer would write. Each is solved as \
-         `pilotage solve NAME` does, nothing set. *Earned* is the discounted return of the automaton where the model holds, mean ± standard error over {EPISODES} \
+         `pilotage solve NAME` does, nothing set. *Earned* is the discounted return of the automaton where the model holds, mean ± standard error over {GALLERY_EPISODES} \
          episodes; the rule acts on the same belief in the same episodes. Where what was planned misses what is earned, the remark says why. Maps show what the \
          automaton does: the mean of the belief across and up, how sure it is in the panels. Version {}, seed {SEED}; made by\n\n\
          ```sh\nscripts/gallery.sh\n```\n",
@@ -270,7 +273,7 @@ fn measure(name: &str, most: Option<usize>, keep: Option<&str>) -> Result<Row, B
     let solution = solve(&entry.solver(&[])?, &scenario, &request, &Silent)?;
     let seconds = processor_time();
     let options = Options {
-        episodes: EPISODES,
+        episodes: most.map_or(GALLERY_EPISODES, |_| EPISODES),
         seed: SEED + 100,
     };
     let earned = solution.earned(&scenario, options, &Silent)?;
