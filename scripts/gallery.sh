@@ -6,6 +6,7 @@ cd "$(dirname "$0")/.."
 
 kept=target/gallery
 rm -rf "$kept"
+mkdir -p docs/images/gallery
 out=(--out docs/gallery.md)
 [ $# -eq 0 ] || out=()
 cargo run --release --locked -p pilotage --example benchmarks -- --gallery "$kept" "${out[@]}" "$@"

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::component::Component;
 use super::frame::Frame;
 use super::reduce::normalise;
-use super::{CUT, Sum, SumKeeping};
+use super::{Sum, SumKeeping};
 use crate::belief::full::Acted;
 use crate::belief::gaussian::normal_density;
 use crate::model::{ActionId, Doing, Effect, EffectTable, Interval, Then, When};
@@ -25,6 +25,9 @@ const REACH: f64 = 6.0;
 
 /// Parts of a component that are left of a step: walls and events in the plane cut it into a hundred, most of them slivers.
 const PARTS: usize = 8;
+
+/// So many times as many Gaussians may a sum have between an action and a reading, which tells the parts that events have cut apart.
+const CUT: usize = 4;
 
 impl SumKeeping {
     /// Takes an action, to these effects; what the episode goes on with is left in the sum.

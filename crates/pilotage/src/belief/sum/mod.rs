@@ -81,9 +81,6 @@ const COMPONENTS: usize = 16;
 /// Gaussians of a mode in a coarse sum: what is free, and what has run against a wall on either side.
 const COARSE: usize = 3;
 
-/// So many times as many Gaussians may a sum have between an action and a reading, which tells the parts that events have cut apart.
-const CUT: usize = 4;
-
 /// A standard deviation so many times smaller than the start's, or than a tenth of the bounds, counts as none.
 const CERTAIN: f64 = 1e-4;
 

@@ -18,10 +18,16 @@ impl SumKeeping {
         step: usize,
         most: usize,
     ) -> Vec<(f64, Sensed)> {
-        match self.dynamics.symbols() {
+        let mut readings = match self.dynamics.symbols() {
             0 => self.numbers(full, action, step, most),
             symbols => self.signals(full, action, step, symbols),
+        };
+        // What modes that are not heard, and quadratures, leave out.
+        let total: f64 = readings.iter().map(|(likely, _)| likely).sum();
+        for (likely, _) in &mut readings {
+            *likely /= total;
         }
+        readings
     }
 
     /// About so many readings: those of a mode are equally likely, and as likely together as it is. Were modes heard out of proportion, those
@@ -80,10 +86,6 @@ impl SumKeeping {
         }
         if missing > NEVER {
             readings.push((missing, Sensed::Nothing));
-        }
-        let total: f64 = readings.iter().map(|(likely, _)| likely).sum();
-        for (likely, _) in &mut readings {
-            *likely /= total;
         }
         readings
     }
@@ -177,18 +179,12 @@ impl SumKeeping {
             });
             each.sum()
         };
-        let mut readings: Vec<(f64, Sensed)> = (0..symbols as u32)
+        (0..symbols as u32)
             .map(Sensed::Symbol)
             .chain([Sensed::Nothing])
             .map(|sensed| (likely(&sensed), sensed))
             .filter(|(likely, _)| *likely > NEVER)
-            .collect();
-        // What quadratures leave out.
-        let total: f64 = readings.iter().map(|(likely, _)| likely).sum();
-        for (likely, _) in &mut readings {
-            *likely /= total;
-        }
-        readings
+            .collect()
     }
 
     /// How likely what was sensed is under a component.

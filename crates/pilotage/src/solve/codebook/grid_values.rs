@@ -47,33 +47,26 @@ impl GridValues {
         let strata = self.codebook.between(moments, &mut Vec::new());
         let around = self.means.around(&moments.mean);
         let value = |action: usize| -> f64 {
-            let of = |&(stratum, weight): &(usize, f64)| {
-                let values = self.of(action, stratum);
-                let points = around.iter();
-                weight
-                    * points
-                        .map(|(point, part)| part * values[*point])
-                        .sum::<f64>()
-            };
+            let of =
+                |&(stratum, weight): &(usize, f64)| weight * self.worth(action, stratum, &around);
             strata.iter().map(of).sum()
         };
         (0..self.actions).map(value).collect()
     }
 
-    /// Values of an action in a stratum, by point.
-    fn of(&self, action: ActionId, stratum: usize) -> &[f64] {
+    /// What an action is worth in a stratum, between points with their weights.
+    fn worth(&self, action: ActionId, stratum: usize, around: &[(usize, f64)]) -> f64 {
         let strata = self.codebook.len();
-        &self.values[action * strata + stratum.min(strata - 1)]
-    }
-
-    fn worth(&self, belief: &Belief, action: ActionId) -> f64 {
-        let values = self.of(action, belief.stratum);
-        let around = self.means.around(&belief.mean).into_iter();
-        around.map(|(point, part)| part * values[point]).sum()
+        let values = &self.values[action * strata + stratum.min(strata - 1)];
+        around
+            .iter()
+            .map(|(point, part)| part * values[*point])
+            .sum()
     }
 
     fn best(&self, belief: &Belief) -> (ActionId, f64) {
-        let value = |action| self.worth(belief, action);
+        let around = self.means.around(&belief.mean);
+        let value = |action| self.worth(action, belief.stratum, &around);
         let better = |best: (ActionId, f64), action| match value(action) {
             value if value > best.1 => (action, value),
             _ => best,
@@ -88,7 +81,8 @@ impl Policy for GridValues {
     }
 
     fn action_value(&self, belief: &Belief, action: ActionId) -> Option<f64> {
-        Some(self.worth(belief, action))
+        let around = self.means.around(&belief.mean);
+        Some(self.worth(action, belief.stratum, &around))
     }
 
     fn action_in_full(&self, held: &Held) -> ActionId {

@@ -28,31 +28,27 @@ impl Means {
 
     /// The points around a mean with their weights, which sum to 1: of those that a wall hides, none, unless it hides all.
     pub(super) fn around(&self, mean: &[f64]) -> Vec<(usize, f64)> {
-        let mut around = self.grid.around(mean);
+        let around = self.grid.around(mean);
         let Some(walls) = &self.walls else {
             return around;
         };
-        let seen = |point: usize| {
-            let there = self.grid.point(point);
+        let is_seen = |(point, _): &&(usize, f64)| {
+            let there = self.grid.point(*point);
             let mut stopped = there.clone();
             walls.stop(mean, &mut stopped);
             let axes = self.grid.axes().iter();
             let apart = stopped.iter().zip(&there).map(|(a, b)| (a - b).abs());
             axes.zip(apart).all(|(axis, apart)| apart <= AT * axis.step)
         };
-        let hidden: Vec<bool> = around.iter().map(|(point, _)| !seen(*point)).collect();
-        let entries = || around.iter().zip(&hidden);
-        let left = entries().filter(|(_, hidden)| !**hidden);
-        let left: f64 = left.map(|((_, weight), _)| weight).sum();
-        if left <= 0.0 {
+        let mut seen: Vec<(usize, f64)> = around.iter().filter(is_seen).copied().collect();
+        let total: f64 = seen.iter().map(|(_, weight)| weight).sum();
+        if total <= 0.0 {
             return around;
         }
-        let mut hidden = hidden.into_iter();
-        around.retain(|_| hidden.next() == Some(false));
-        for (_, weight) in &mut around {
-            *weight /= left;
+        for (_, weight) in &mut seen {
+            *weight /= total;
         }
-        around
+        seen
     }
 }
 
