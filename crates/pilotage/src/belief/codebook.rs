@@ -2,7 +2,7 @@
 
 use super::full::Moments;
 use super::{Belief, StratumId};
-use crate::model::{Interval, ModeId, Model};
+use crate::model::{Doing, Dynamics, Interval, ModeId, Model};
 
 /// Strata that two beliefs lie between are told by their covariance and by how likely modes are and, where a model changes with the step of
 /// the episode, by the step. Distances are measured between logarithms of standard deviations, correlations, and square roots of
@@ -27,6 +27,8 @@ pub struct Stratum {
     pub step: usize,
     /// Where it is among strata.
     code: Vec<f64>,
+    /// The same, with probabilities of modes as they are: those after readings are on average those before.
+    average: Vec<f64>,
 }
 
 /// How far apart beliefs of certain and of even modes are, in the units of logarithms of standard deviations.
@@ -37,6 +39,9 @@ const STEP: f64 = 0.5;
 
 /// A belief that is so many times narrower than the start, or than the bounds, is certain.
 const CERTAIN: f64 = 1e-3;
+
+/// So is one that is so many times narrower than what any step adds to it.
+const HARDLY: f64 = 0.1;
 
 /// Most beliefs that strata are brought near to, and most that they are chosen among.
 const LOOKED_AT: usize = 4_000;
@@ -91,12 +96,14 @@ impl Stratum {
 impl Codebook {
     /// A codebook for a model of strata to be added.
     pub fn new(model: &Model) -> Self {
+        let stirred = stirred(model);
         let floor = |i: usize| {
             let starts = model.start.iter();
             let widest = starts.map(|start| start.covariance[(i, i)].max(0.0).sqrt());
             let width = model.state[i].bounds.width();
             let width = if width.is_finite() { 0.1 * width } else { 0.0 };
-            CERTAIN * widest.fold(width, f64::max).max(f64::MIN_POSITIVE)
+            let floor = CERTAIN * widest.fold(width, f64::max).max(f64::MIN_POSITIVE);
+            floor.max(HARDLY * stirred[i])
         };
         Self {
             strata: Vec::new(),
@@ -157,11 +164,14 @@ impl Codebook {
     pub fn add(&mut self, moments: &Moments) {
         let mut code = Vec::new();
         self.write_code(moments, &mut code);
+        let mut average = code.clone();
+        self.even_modes(moments, &mut average);
         self.strata.push(Stratum {
             covariance: moments.covariance.clone(),
             weights: moments.weights.clone(),
             step: moments.step.min(self.clock),
             code,
+            average,
         });
     }
 
@@ -288,8 +298,9 @@ impl Codebook {
         }
         let corners: Vec<&[f64]> = near
             .iter()
-            .map(|(id, _)| self.strata[*id].code.as_slice())
+            .map(|(id, _)| self.strata[*id].average.as_slice())
             .collect();
+        self.even_modes(moments, code);
         let weights = barycentric(&corners, code);
         let shares = near.into_iter().map(|(id, _)| id).zip(weights);
         shares.filter(|(_, weight)| *weight > 0.0).collect()
@@ -325,6 +336,42 @@ impl Codebook {
             code.push(STEP * moments.step.min(self.clock) as f64);
         }
     }
+
+    /// Turns square roots of probabilities in a code into the probabilities themselves.
+    fn even_modes(&self, moments: &Moments, code: &mut [f64]) {
+        let modes = moments.weights.len();
+        if modes > 1 {
+            let end = code.len() - usize::from(self.clock > 0);
+            let roots = code[end - modes..end].iter_mut();
+            for (root, weight) in roots.zip(&moments.weights) {
+                *root = MODES * weight;
+            }
+        }
+    }
+}
+
+/// The least standard deviations of the noise that any action in any mode adds to where one may start, length `n`.
+fn stirred(model: &Model) -> Vec<f64> {
+    let n = model.state_dim();
+    let dynamics = Dynamics::new(model);
+    let mut least = vec![f64::INFINITY; n];
+    let mut noise = vec![0.0; n * n];
+    for start in &model.start {
+        for mode in 0..dynamics.modes() {
+            for action in 0..dynamics.actions() {
+                let doing = Doing {
+                    mode,
+                    action,
+                    step: 0,
+                };
+                dynamics.transition_noise(doing, start.mean.as_slice(), &mut noise);
+                for (i, least) in least.iter_mut().enumerate() {
+                    *least = least.min(noise[i * n + i].max(0.0).sqrt());
+                }
+            }
+        }
+    }
+    least
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {

@@ -56,7 +56,11 @@ struct Rule {
 #[derive(Debug, Clone)]
 enum Noise {
     Constant(Vec<f64>),
-    Varying(Vec<Formula>),
+    Varying {
+        formulas: Vec<Formula>,
+        /// The first entry of which the formula is that of each entry: what is written more than once is evaluated once.
+        first: Vec<usize>,
+    },
 }
 
 impl Noise {
@@ -66,15 +70,26 @@ impl Noise {
         };
         let entries = own.transpose().as_slice().to_vec();
         let numbers: Option<Vec<f64>> = entries.iter().map(Formula::constant).collect();
-        numbers.map_or(Self::Varying(entries), Self::Constant)
+        if let Some(numbers) = numbers {
+            return Self::Constant(numbers);
+        }
+        let same = |(i, entry)| entries.iter().position(|other| other == entry).unwrap_or(i);
+        let first = entries.iter().enumerate().map(same).collect();
+        Self::Varying {
+            formulas: entries,
+            first,
+        }
     }
 
     fn write(&self, point: &Point<'_>, to: &mut [f64]) {
         match self {
             Self::Constant(numbers) => to.copy_from_slice(numbers),
-            Self::Varying(formulas) => {
-                for (value, formula) in to.iter_mut().zip(formulas) {
-                    *value = formula.value(point);
+            Self::Varying { formulas, first } => {
+                for (i, (formula, &first)) in formulas.iter().zip(first).enumerate() {
+                    to[i] = match first < i {
+                        true => to[first],
+                        false => formula.value(point),
+                    };
                 }
             }
         }
@@ -221,7 +236,7 @@ impl Dynamics {
     pub fn constant_transition_noise(&self, doing: Doing) -> Option<&[f64]> {
         match &self.rule(doing).motion_noise {
             Noise::Constant(numbers) => Some(numbers),
-            Noise::Varying(_) => None,
+            Noise::Varying { .. } => None,
         }
     }
 
@@ -307,7 +322,7 @@ impl Dynamics {
     pub fn constant_observation_noise(&self, doing: Doing) -> Option<&[f64]> {
         match &self.rule(doing).sensor_noise {
             Noise::Constant(numbers) => Some(numbers),
-            Noise::Varying(_) => None,
+            Noise::Varying { .. } => None,
         }
     }
 

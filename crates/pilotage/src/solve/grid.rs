@@ -274,16 +274,6 @@ impl Grid {
         around
     }
 
-    /// The point that is nearest to a place.
-    pub(crate) fn nearest(&self, at: &[f64]) -> usize {
-        let axes = self.axes.iter().zip(&self.strides).zip(at);
-        axes.map(|((axis, stride), x)| {
-            let last = (axis.count - 1) as f64;
-            ((x - axis.low) / axis.step).round().clamp(0.0, last) as usize * stride
-        })
-        .sum()
-    }
-
     /// The points before and after a point along an axis; `None` at its ends.
     pub(crate) fn beside(&self, point: usize, axis: usize) -> Option<[usize; 2]> {
         let (count, stride) = (self.axes[axis].count, self.strides[axis]);

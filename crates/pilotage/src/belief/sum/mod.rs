@@ -347,6 +347,7 @@ impl Keeping for SumKeeping {
                 }
             }
         }
+        self.keep_side(full, moments);
     }
 
     fn with_moments(&self, moments: &Moments) -> Sum {
@@ -374,14 +375,16 @@ impl Keeping for SumKeeping {
     fn moved_to(&self, full: &Sum, mean: &[f64]) -> Sum {
         let mut moments = Moments::default();
         self.moments(full, &mut moments);
+        let mut mean = mean.to_vec();
+        if let Some(walls) = self.dynamics.walls() {
+            walls.confine(&mut mean);
+        }
         let mut moved = full.clone();
         for component in &mut moved.components {
-            for ((value, to), from) in component.mean.iter_mut().zip(mean).zip(&moments.mean) {
+            for ((value, to), from) in component.mean.iter_mut().zip(&mean).zip(&moments.mean) {
                 *value += to - from;
             }
-            if let Some(walls) = self.dynamics.walls() {
-                walls.confine(&mut component.mean);
-            }
+            self.confine(&mean, &moments.covariance, &mut component.mean);
             self.dynamics.round_within(&mut component.mean);
         }
         if moved.components.len() > self.most {

@@ -4,8 +4,9 @@ use super::component::Component;
 use super::frame::{place, root};
 use super::quadrature::Rule;
 use super::reduce::Likeness;
-use super::{NARROW, SumKeeping, points};
-use crate::model::{Doing, StartShape, VariableKind};
+use super::{NARROW, Sum, SumKeeping, points};
+use crate::belief::Moments;
+use crate::model::{Barriers, Doing, StartShape, VariableKind};
 
 /// Standard deviations over which the bend of a motion is looked at.
 const WIDTH: f64 = 1.5;
@@ -18,6 +19,9 @@ const OTHER_NOISE: f64 = 4.0;
 
 /// Share of the variance after a move that noise must have to matter.
 const NOISY: f64 = 0.25;
+
+/// Share of the side of a cell of a map up to which a standard deviation is narrow.
+const ONE_SIDED: f64 = 0.5;
 
 /// Lighter Gaussians are not split.
 const LIGHT: f64 = 1e-3;
@@ -209,6 +213,33 @@ impl SumKeeping {
         gathered.of(component)
     }
 
+    /// Moves a point of what is believed, of which mean and covariance are given, to where a state can be: what is narrow beside the cells of
+    /// a map is on one side of each wall only, that of its mean.
+    pub(super) fn confine(&self, mean: &[f64], covariance: &[f64], point: &mut [f64]) {
+        let Some(walls) = self.dynamics.walls() else {
+            return;
+        };
+        match is_one_sided(walls, covariance, mean.len()) {
+            true => walls.stop(mean, point),
+            false => walls.confine(point),
+        }
+    }
+
+    /// Moves the mean of a narrow belief to the side of the walls on which most of it is: what little may be beyond one would otherwise
+    /// draw the mean through it.
+    pub(super) fn keep_side(&self, full: &Sum, moments: &mut Moments) {
+        let Some(walls) = self.dynamics.walls() else {
+            return;
+        };
+        let heavier = |a: &&Component, b: &&Component| a.weight.total_cmp(&b.weight);
+        let Some(heaviest) = full.components.iter().max_by(heavier) else {
+            return;
+        };
+        if is_one_sided(walls, &moments.covariance, moments.mean.len()) {
+            walls.stop(&heaviest.mean, &mut moments.mean);
+        }
+    }
+
     /// Where the walls of a map stop the way, point by point: what gets through and what does not.
     fn on_the_map(&self, component: Component, doing: Doing) -> Vec<Component> {
         let n = component.dim();
@@ -225,9 +256,7 @@ impl SumKeeping {
         let mut stopped = Gathered::new(&self.likeness, n);
         for (z, weight) in states.iter() {
             place(&component.mean, &spread, z, &mut at);
-            if let Some(walls) = self.dynamics.walls() {
-                walls.confine(&mut at);
-            }
+            self.confine(&component.mean, &component.covariance, &mut at);
             self.dynamics.transition(doing, &at, &mut led);
             self.dynamics.transition_noise(doing, &at, &mut noise);
             let quiet = noise.iter().all(|entry| *entry == 0.0);
@@ -267,6 +296,12 @@ impl SumKeeping {
             })
             .collect()
     }
+}
+
+/// Whether what has this covariance, `n x n`, is narrow beside the cells of a map.
+fn is_one_sided(walls: &Barriers, covariance: &[f64], n: usize) -> bool {
+    let cell = walls.map.as_ref().map_or(0.0, |map| map.cell);
+    (0..n.min(2)).all(|i| covariance[i * n + i] <= (ONE_SIDED * cell).powi(2))
 }
 
 /// Weighted points, of which mean and covariance are asked.

@@ -136,9 +136,7 @@ impl SumKeeping {
                 k += 1;
                 let own = own.get_or_insert_with(|| root(&component.covariance, n));
                 place(&component.mean, own, &z[..n], &mut at);
-                if let Some(walls) = self.dynamics.walls() {
-                    walls.confine(&mut at);
-                }
+                self.confine(&component.mean, &component.covariance, &mut at);
                 self.dynamics.round_within(&mut at);
                 sensor.set_mode(component.mode);
                 let present = self.dynamics.present(sensor.doing, &at);

@@ -87,7 +87,11 @@ impl SumKeeping {
         let own = |component: &&Component| seen.is_none_or(|mode| mode == component.mode);
         for component in full.components.iter().filter(own) {
             sensor.set_mode(component.mode);
+            let before = passing.parts.len();
             self.pass(component.clone(), &mut sensor, DEPTH, &mut passing);
+            for part in &mut passing.parts[before..] {
+                self.tidy(component, part);
+            }
         }
         let Passing {
             mut parts,
@@ -100,17 +104,14 @@ impl SumKeeping {
         }
         for (part, log) in parts.iter_mut().zip(&logs) {
             part.weight = (log - best).exp();
-            self.tidy(part);
         }
         parts.retain(|part| part.weight > 0.0);
         full.components = parts;
     }
 
-    /// A mean where a state can be.
-    fn tidy(&self, part: &mut Component) {
-        if let Some(walls) = self.dynamics.walls() {
-            walls.confine(&mut part.mean);
-        }
+    /// The mean of what has become of a Gaussian, where a state can be.
+    fn tidy(&self, component: &Component, part: &mut Component) {
+        self.confine(&component.mean, &component.covariance, &mut part.mean);
         if self.dynamics.kinds().contains(&VariableKind::Angle) {
             self.dynamics.wrap(&mut part.mean);
         }

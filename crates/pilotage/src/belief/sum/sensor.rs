@@ -9,6 +9,9 @@ use crate::model::{ActionId, Doing, Dynamics, ModeId};
 /// Noise of no variance is taken for one of this variance.
 const LEAST: f64 = 1e-24;
 
+/// Two numbers are told apart by a root where less of one, as a share of its variance, is unknown once the other is known.
+const APART: f64 = 1e-9;
+
 /// A reading on its way into a sum, with room for what is asked at a state.
 pub(super) struct Sensor<'a> {
     dynamics: &'a Dynamics,
@@ -127,12 +130,51 @@ impl<'a> Sensor<'a> {
             let variance = &mut self.noise[r * self.m + r];
             *variance = variance.max(LEAST);
         }
+        if let (&[x, y], &[xx, xy, _, yy]) = (self.values.as_slice(), self.noise.as_slice())
+            && let Some(log) = log_normal_of_two((x, y), (xx, xy, yy))
+        {
+            return log;
+        }
         root_into(&self.noise, self.m, &mut self.root);
         whiten(&self.root, &mut self.values)
     }
 }
 
+/// Logarithm of the density of two numbers of mean 0; none where one is all but known from the other.
+fn log_normal_of_two((x, y): (f64, f64), (xx, xy, yy): (f64, f64, f64)) -> Option<f64> {
+    let determinant = xx * yy - xy * xy;
+    if determinant <= APART * xx * yy {
+        return None;
+    }
+    let apart = (x * x * yy - 2.0 * x * y * xy + y * y * xx) / determinant;
+    Some(-0.5 * (apart + determinant.ln()) - LOG_TAU)
+}
+
 fn log_normal(apart: f64, variance: f64) -> f64 {
     let variance = variance.max(LEAST);
     -0.5 * (apart * apart / variance + variance.ln() + LOG_TAU)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_numbers_are_as_likely_as_one_and_the_other_once_it_is_known() {
+        let cases = [
+            ((0.3, -0.7), (2.0, 0.9, 0.5)),
+            ((-4.0, 1.5), (0.01, -0.02, 0.3)),
+            ((1.0, 2.0), (3.0, 0.0, 1e-6)),
+        ];
+        for ((x, y), (xx, xy, yy)) in cases {
+            let then = log_normal(y - xy / xx * x, yy - xy * xy / xx);
+            let expected = log_normal(x, xx) + then;
+            let log = log_normal_of_two((x, y), (xx, xy, yy)).expect("far from known");
+            assert!(
+                (log - expected).abs() < 1e-9 * expected.abs(),
+                "{log} {expected}"
+            );
+        }
+        assert_eq!(log_normal_of_two((1.0, 1.0), (1.0, 1.0, 1.0)), None);
+    }
 }

@@ -405,6 +405,40 @@ fn a_place_at_a_wall_holds_what_is_believed_beyond_it() {
     }
 }
 
+/// In `rooms`, a wall runs from north to south at x = 3, but for the doors in the middle.
+#[test]
+fn who_leans_on_a_wall_stays_on_its_side() {
+    let model = crate::scenario::find("rooms").unwrap().model;
+    let east = model.actions.iter().position(|a| a.name == "EAST").unwrap();
+    let keeping = SumKeeping::new(&model);
+    let mut full = keeping.with_moments(&Moments {
+        mean: vec![2.9, 1.0],
+        covariance: vec![0.04, 0.0, 0.0, 0.04],
+        weights: vec![1.0, 0.0, 0.0, 0.0],
+        step: 0,
+    });
+    let mut moments = Moments::default();
+    for _ in 0..5 {
+        keeping.act(&mut full, east, 0);
+        keeping.sense(&mut full, east, 0, Reading::Values(&[3.4, 1.0, 0.5]));
+        keeping.moments(&full, &mut moments);
+        assert!(moments.mean[0] < 3.0, "{moments:?}");
+        for component in &full.components {
+            assert!(component.mean[0] < 3.0, "{component:?}");
+        }
+    }
+    // A little of it on the other side does not draw the mean through the wall.
+    let mut beyond = full.components[0].clone();
+    beyond.mean[0] = 4.0;
+    for component in &mut full.components {
+        component.weight *= 0.9;
+    }
+    beyond.weight = 0.1;
+    full.components.push(beyond);
+    keeping.moments(&full, &mut moments);
+    assert!(moments.mean[0] < 3.0, "{moments:?}");
+}
+
 proptest! {
     /// Merging the last of some Gaussians changes neither the others nor the moments.
     #[test]

@@ -26,7 +26,7 @@ impl GridValues {
         found: &[f64],
         actions: usize,
     ) -> Self {
-        let (points, strata) = (means.grid.len(), codebook.len());
+        let (points, strata) = (means.len(), codebook.len());
         let of = |action: usize, stratum: usize| {
             let at = move |point: usize| (stratum * points + point) * actions + action;
             (0..points).map(|point| found[at(point)]).collect()

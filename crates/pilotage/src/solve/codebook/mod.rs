@@ -22,7 +22,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::grid::{Axis, Grid, Interpolation};
+use super::grid::Axis;
 use super::refusals;
 use super::settings::{Settings, ensure};
 use super::solver::{Found, Plan, Planner, Problem, refuse_if};
@@ -242,14 +242,10 @@ impl<'a, K: Keeping> Course<'a, K> {
         let (apart, most) = (self.planner.apart, self.size.strata_of(round));
         let added = self.codebook.cover(&moments, apart, most).into_iter();
         self.shapes.extend(added.map(|i| self.met[i].full.clone()));
-        let reaches = |rows: &Rows| {
-            moments
-                .iter()
-                .all(|met| rows.means.grid.contains(&met.mean))
-        };
+        let reaches = |rows: &Rows| moments.iter().all(|met| rows.means.contains(&met.mean));
         let earlier = self.earlier.take().filter(reaches);
         let known = earlier.as_ref().map(|rows| rows.means.clone());
-        let made = || Means::new(self.model, grid(self.model, &moments, &self.points));
+        let made = || Means::new(self.model, axes(self.model, &moments, &self.points));
         let means = known.unwrap_or_else(made);
         let coarse = self.keeping.coarse();
         let keeping = self.keeping.as_ref();
@@ -353,8 +349,8 @@ impl CodebookPlanner {
     }
 }
 
-/// Points of means that cover those that were met.
-fn grid(model: &Model, met: &[Moments], points: &[usize]) -> Grid {
+/// Evenly spaced points of means that cover those that were met.
+fn axes(model: &Model, met: &[Moments], points: &[usize]) -> Vec<Axis> {
     let axis = |i: usize| {
         let means = met.iter().map(|moments| moments.mean[i]);
         let (low, high) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
@@ -368,7 +364,7 @@ fn grid(model: &Model, met: &[Moments], points: &[usize]) -> Grid {
         );
         Axis::new(low, high.max(low + 1e-9), points[i])
     };
-    Grid::new((0..points.len()).map(axis).collect(), Interpolation::Linear)
+    (0..points.len()).map(axis).collect()
 }
 
 /// As many points as leave straight lines between them off by as much as may be, where they are `off` by so many times that; at most twice

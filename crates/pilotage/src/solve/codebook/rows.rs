@@ -56,7 +56,7 @@ struct Reader<'a> {
 impl Reader<'_> {
     /// The states that a belief lies between, with weights that sum to 1.
     fn states(&self, moments: &Moments, code: &mut Vec<f64>, to: &mut Vec<(u32, f64)>, share: f64) {
-        let points = self.means.grid.len();
+        let points = self.means.len();
         let around = self.means.around(&moments.mean);
         for (stratum, weight) in self.codebook.between(moments, code) {
             for (point, part) in &around {
@@ -67,7 +67,7 @@ impl Reader<'_> {
 
     /// Which states beliefs that were met lie between.
     fn near<F>(&self, met: &[Met<F>]) -> Vec<bool> {
-        let mut near = vec![false; self.codebook.len() * self.means.grid.len()];
+        let mut near = vec![false; self.codebook.len() * self.means.len()];
         let (mut code, mut states) = (Vec::new(), Vec::new());
         for met in met {
             states.clear();
@@ -165,7 +165,7 @@ impl Rows {
             length,
         };
         let actions = keeping.actions();
-        let points = means.grid.len();
+        let points = means.len();
         let states = codebook.len() * points;
         let refined = refined::<K>(&reader, met, most);
         let near = reader.near(met);
@@ -180,7 +180,7 @@ impl Rows {
             if kept(state) {
                 return None;
             }
-            let mean = means.grid.point(state % points);
+            let mean = means.point(state % points);
             let stratum = codebook.stratum(state / points);
             if let Some(plan) = plan.filter(|_| !near[state]) {
                 return Some(State::Worth(plan.values_between(&stratum.at(mean))));
@@ -282,14 +282,14 @@ impl Rows {
     /// point is left out a point itself says it; lines half as long are off by a quarter of that.
     pub(super) fn bends<F>(&self, codebook: &Codebook, found: &[f64], met: &[Met<F>]) -> Vec<f64> {
         let values = self.best(found);
-        let mut bends = vec![0.0; self.means.grid.axes().len()];
+        let mut bends = vec![0.0; self.means.dim()];
         let mut code = Vec::new();
         for met in met {
             let stratum = codebook.nearest(&met.moments, &mut code);
-            let point = self.means.grid.nearest(&met.moments.mean);
-            let at = |point: usize| values[stratum * self.means.grid.len() + point];
+            let point = self.means.nearest(&met.moments.mean);
+            let at = |point: usize| values[stratum * self.means.len() + point];
             for (axis, bend) in bends.iter_mut().enumerate() {
-                if let Some([before, after]) = self.means.grid.beside(point, axis) {
+                if let Some([before, after]) = self.means.beside(point, axis) {
                     *bend += 0.25 * (at(point) - 0.5 * (at(before) + at(after))).abs();
                 }
             }
@@ -357,9 +357,9 @@ fn refined<K: Keeping>(
     let mut code = Vec::new();
     for (i, met) in met.iter().enumerate().step_by(stride) {
         let stratum = reader.codebook.nearest(&met.moments, &mut code);
-        let point = reader.means.grid.nearest(&met.moments.mean);
+        let point = reader.means.nearest(&met.moments.mean);
         let fulls = refined
-            .entry(stratum * reader.means.grid.len() + point)
+            .entry(stratum * reader.means.len() + point)
             .or_default();
         if fulls.len() < SHARED {
             fulls.push(i);
