@@ -6,11 +6,11 @@ cd "$(dirname "$0")/.."
 
 kept=target/gallery
 rm -rf "$kept"
-mkdir -p docs/images/gallery
+mkdir -p docs/gallery
 out=(--out docs/gallery.md)
 [ $# -eq 0 ] || out=()
 cargo run --release --locked -p pilotage --example benchmarks -- --gallery "$kept" "${out[@]}" "$@"
 for policy in "$kept"/*.json; do
-  cargo run --release --locked -- draw "$policy" --out docs/images/gallery
+  cargo run --release --locked -- draw "$policy" --out docs/gallery
 done
-rm -f docs/images/gallery/*-automaton.svg
+rm -f docs/gallery/*-automaton.svg

@@ -30,6 +30,10 @@ const EPISODES: usize = 20_000;
 /// Episodes by which problems of the gallery are measured.
 const GALLERY_EPISODES: usize = 10_000;
 
+/// Most nodes of the automata of the gallery that are drawn, and of those that are written out.
+const GALLERY_NODES: usize = 30;
+const WRITTEN_OUT: usize = 12;
+
 const SEED: u64 = 1;
 
 #[derive(Deserialize)]
@@ -84,8 +88,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments: Vec<String> = std::env::args().skip(1).collect();
     if let Some(name) = value_of("--one", &mut arguments) {
         let most = value_of("--most", &mut arguments).map(|most| most.parse());
+        let episodes = value_of("--episodes", &mut arguments).map(|episodes| episodes.parse());
         let keep = value_of("--keep", &mut arguments);
-        let row = measure(&name, most.transpose()?, keep.as_deref())?;
+        let row = measure(
+            &name,
+            most.transpose()?,
+            episodes.transpose()?.unwrap_or(EPISODES),
+            keep.as_deref(),
+        )?;
         println!("{}", serde_json::to_string(&row)?);
         return Ok(());
     }
@@ -139,7 +149,7 @@ fn gallery_heading() -> String {
     format!(
         "# Gallery\n\n\
          Problems that people have, each a model file in [models/gallery](../models/gallery) with a rule of thumb that an engineer would write. Each is solved as \
-         `pilotage solve NAME` does, nothing set. *Earned* is the discounted return of the automaton where the model holds, mean ± standard error over {GALLERY_EPISODES} \
+         `pilotage solve NAME --loss 0` does, no return being lost by fewer nodes, and with `--nodes {GALLERY_NODES}` for an automaton to look at. *Earned* is the discounted return of the automaton where the model holds, mean ± standard error over {GALLERY_EPISODES} \
          episodes; the rule acts on the same belief in the same episodes. Where what was planned misses what is earned, the remark says why. Maps show what the \
          automaton does: the mean of the belief across and up, how sure it is in the panels. Version {}, seed {SEED}; made by\n\n\
          ```sh\nscripts/gallery.sh\n```\n",
@@ -147,23 +157,23 @@ fn gallery_heading() -> String {
     )
 }
 
-/// Trees of more nodes are not written out.
-const WRITTEN_OUT: usize = 12;
-
-/// Measures a problem of the gallery, and keeps its automaton in a folder.
+/// Measures a problem of the gallery, and keeps its small automaton in a folder.
 fn exhibit(name: &str, folder: &str) -> Result<String, Box<dyn Error>> {
     let model = scenario::find(name)?.model;
-    let row = in_its_own_process(name, None, Some(&format!("{folder}/{name}.json")))?;
+    let kept = format!("{folder}/{name}.json");
+    let small = in_its_own_process(name, Some(GALLERY_NODES), GALLERY_EPISODES, Some(&kept))?;
+    let large = in_its_own_process(name, None, GALLERY_EPISODES, None)?;
     let mut text = format!(
-        "\n## `{name}`\n\n{}\n\n![What the automaton of {name} does](images/gallery/{name}-map.svg)\n\n{HEAD}{}",
+        "\n## `{name}`\n\n{}\n\n![What the automaton of {name} does](gallery/{name}-map.svg)\n\n{HEAD}{}{}",
         model.about,
-        row.line(usual_digits())
+        small.line(usual_digits()),
+        large.line(usual_digits())
     );
-    for remark in &row.remarks {
+    for remark in &large.remarks {
         text += &format!("\nRemark: {remark}.\n");
     }
-    if row.nodes <= WRITTEN_OUT {
-        text += &format!("\n```text\n{}\n```\n", row.conditions.trim_end());
+    if small.nodes <= WRITTEN_OUT {
+        text += &format!("\n```text\n{}\n```\n", small.conditions.trim_end());
     }
     Ok(text)
 }
@@ -174,13 +184,16 @@ fn section(problem: &Problem) -> Result<String, Box<dyn Error>> {
     let mut text = format!("\n## `{}`\n\n{}\n\n", problem.name, model.about);
     text += HEAD;
     for most in &problem.nodes {
-        text += &in_its_own_process(&problem.name, Some(*most), None)?.line(problem.digits);
+        text +=
+            &in_its_own_process(&problem.name, Some(*most), EPISODES, None)?.line(problem.digits);
     }
     if problem.told {
         let most = problem.nodes.iter().copied().max();
         let starts = 1..=model.start.len();
         let rows: Result<Vec<Row>, _> = starts
-            .map(|start| in_its_own_process(&format!("{}@{start}", problem.name), most, None))
+            .map(|start| {
+                in_its_own_process(&format!("{}@{start}", problem.name), most, EPISODES, None)
+            })
             .collect();
         text += &told(&rows?, problem.digits);
     }
@@ -214,6 +227,7 @@ fn told(rows: &[Row], digits: usize) -> String {
 fn in_its_own_process(
     name: &str,
     most: Option<usize>,
+    episodes: usize,
     keep: Option<&str>,
 ) -> Result<Row, Box<dyn Error>> {
     let limit = most.map(|most| most.to_string());
@@ -224,6 +238,7 @@ fn in_its_own_process(
     let flags = [
         ("--one", Some(name)),
         ("--most", limit.as_deref()),
+        ("--episodes", Some(&episodes.to_string())),
         ("--keep", keep),
     ];
     let given = flags
@@ -260,20 +275,25 @@ fn whole(number: Option<f64>) -> String {
     number.map_or_else(|| "-".to_owned(), |number| format!("{number:.0}"))
 }
 
-/// Solves a problem with the first planner for it, and runs what it found. Where nodes are limited, no return may be lost by fewer.
-fn measure(name: &str, most: Option<usize>, keep: Option<&str>) -> Result<Row, Box<dyn Error>> {
+/// Solves a problem with the first planner for it, and runs what it found. No return may be lost by fewer nodes.
+fn measure(
+    name: &str,
+    most: Option<usize>,
+    episodes: usize,
+    keep: Option<&str>,
+) -> Result<Row, Box<dyn Error>> {
     let scenario = scenario::find(name)?;
     let entry = *Registry::builtin().first_for(&scenario.model)?;
     let request = Request {
         nodes: most,
-        loss: most.map(|_| 0.0),
+        loss: Some(0.0),
         seed: SEED,
         ..Request::form(Form::Tree)
     };
     let solution = solve(&entry.solver(&[])?, &scenario, &request, &Silent)?;
     let seconds = processor_time();
     let options = Options {
-        episodes: most.map_or(GALLERY_EPISODES, |_| EPISODES),
+        episodes,
         seed: SEED + 100,
     };
     let earned = solution.earned(&scenario, options, &Silent)?;

@@ -53,8 +53,8 @@ pub struct CodebookPlanner {
     /// Points of the grid of means along each variable; at least 2, or `auto` for what suits the number of variables, and up to twice as many in
     /// each further round where values bend between them.
     pub points: Option<usize>,
-    /// Readings that are thought of after an action; at least 1.
-    pub readings: usize,
+    /// Readings that are thought of after an action; at least 1, or `auto` for 15 where one number is read and 9 elsewhere.
+    pub readings: Option<usize>,
     /// Times that the plan is refined on the beliefs that it meets; at least 1.
     pub rounds: usize,
     /// Episodes that are run to meet beliefs in a round; at least 1, at most a million.
@@ -72,7 +72,7 @@ impl Default for CodebookPlanner {
             strata: None,
             apart: 0.12,
             points: None,
-            readings: 9,
+            readings: None,
             rounds: 3,
             episodes: 200,
             refined: None,
@@ -88,7 +88,8 @@ impl Settings for CodebookPlanner {
         ensure("apart", self.apart, self.apart > 0.0, "above 0")?;
         let points = self.points.unwrap_or(2);
         ensure("points", points, points >= 2, "at least 2")?;
-        ensure("readings", self.readings, self.readings >= 1, "at least 1")?;
+        let readings = self.readings.unwrap_or(1);
+        ensure("readings", readings, readings >= 1, "at least 1")?;
         ensure("rounds", self.rounds, self.rounds >= 1, "at least 1")?;
         super::rollout::check_runs("episodes", self.episodes)?;
         ensure("tolerance", self.tolerance, self.tolerance > 0.0, "above 0")
@@ -143,6 +144,7 @@ struct Size {
     strata: usize,
     rounds: usize,
     refined: usize,
+    readings: usize,
 }
 
 impl Size {
@@ -198,7 +200,7 @@ impl<'a, K: Keeping> Course<'a, K> {
             model,
             updater,
             seed,
-            size: planner.size(keeping.is_light()),
+            size: planner.size(model, keeping.is_light()),
             codebook: Codebook::new(model),
             shapes: Vec::new(),
             met: meet(model, keeping.as_ref(), None, planner.episodes, seed),
@@ -214,7 +216,13 @@ impl<'a, K: Keeping> Course<'a, K> {
         let rows = self.rows(round);
         let found = rows.solve(model.discount, planner.tolerance);
         let keeping = self.keeping.as_ref();
-        let planned = rows.worth(keeping, &self.codebook, &found, model.discount, planner);
+        let planned = rows.worth(
+            keeping,
+            &self.codebook,
+            &found,
+            model.discount,
+            self.size.readings,
+        );
         let codebook = Arc::new(self.codebook.clone());
         let actions = model.actions.len();
         let values = GridValues::new(rows.means.clone(), Arc::clone(&codebook), &found, actions);
@@ -254,7 +262,7 @@ impl<'a, K: Keeping> Course<'a, K> {
             (&self.codebook, self.shapes.as_slice()),
             (means, self.model.episode.length),
             &self.met,
-            (self.size.refined, self.planner.readings),
+            (self.size.refined, self.size.readings),
             (self.plan.as_ref(), earlier),
         )
     }
@@ -326,13 +334,18 @@ impl CodebookPlanner {
         })
     }
 
-    /// What is not set, by whether a step of a belief takes little time.
-    fn size(&self, light: bool) -> Size {
+    /// What is not set, by what is read and by whether a step of a belief takes little time.
+    fn size(&self, model: &Model, light: bool) -> Size {
         let or = |set: Option<usize>, quick, slow| set.unwrap_or(if light { quick } else { slow });
         Size {
             strata: or(self.strata, 120, 40),
             rounds: self.rounds,
             refined: or(self.refined, 4000, 1000),
+            // Single numbers can be put in order, and each of them counts.
+            readings: self.readings.unwrap_or(match model.sensor_dim() {
+                0 | 1 => 15,
+                _ => 9,
+            }),
         }
     }
 

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::GridValues;
 use super::means::Means;
 use super::meet::Met;
-use super::{CodebookPlanner, GridValues};
 use crate::belief::{Codebook, Keeping, Moments};
 use crate::parallel;
 use crate::policy::first_best;
@@ -316,7 +316,7 @@ impl Rows {
         codebook: &Codebook,
         found: &[f64],
         discount: f64,
-        settings: &CodebookPlanner,
+        readings: usize,
     ) -> f64 {
         let reader = Reader {
             codebook,
@@ -329,7 +329,7 @@ impl Rows {
         };
         let start = keeping.start();
         let of = |action| {
-            let row = reader.row(keeping, (&start, 0), action, FINE * settings.readings);
+            let row = reader.row(keeping, (&start, 0), action, FINE * readings);
             self.worth_of(&row, &values, discount)
         };
         best_of((0..self.actions).map(of))
