@@ -2,7 +2,7 @@
 
 use super::full::Moments;
 use super::{Belief, StratumId};
-use crate::model::{Doing, Dynamics, Interval, ModeId, Model};
+use crate::model::{Dynamics, Interval, ModeId, Model};
 
 /// Strata that two beliefs lie between are told by their covariance and by how likely modes are and, where a model changes with the step of
 /// the episode, by the step. Distances are measured between logarithms of standard deviations, correlations, and square roots of
@@ -357,17 +357,10 @@ fn stirred(model: &Model) -> Vec<f64> {
     let mut least = vec![f64::INFINITY; n];
     let mut noise = vec![0.0; n * n];
     for start in &model.start {
-        for mode in 0..dynamics.modes() {
-            for action in 0..dynamics.actions() {
-                let doing = Doing {
-                    mode,
-                    action,
-                    step: 0,
-                };
-                dynamics.transition_noise(doing, start.mean.as_slice(), &mut noise);
-                for (i, least) in least.iter_mut().enumerate() {
-                    *least = least.min(noise[i * n + i].max(0.0).sqrt());
-                }
+        for doing in dynamics.doings() {
+            dynamics.transition_noise(doing, start.mean.as_slice(), &mut noise);
+            for (i, least) in least.iter_mut().enumerate() {
+                *least = least.min(noise[i * n + i].max(0.0).sqrt());
             }
         }
     }

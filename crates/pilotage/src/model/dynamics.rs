@@ -191,6 +191,19 @@ impl Dynamics {
         self.actions
     }
 
+    /// Every action in every mode, at the first step of an episode.
+    pub(crate) fn doings(&self) -> impl Iterator<Item = Doing> + use<> {
+        let actions = self.actions;
+        let of = move |mode| {
+            (0..actions).map(move |action| Doing {
+                mode,
+                action,
+                step: 0,
+            })
+        };
+        (0..self.modes).flat_map(of)
+    }
+
     fn rule(&self, doing: Doing) -> &Rule {
         let phase = self.later.partition_point(|from| *from <= doing.step);
         &self.rules[(phase * self.modes + doing.mode) * self.actions + doing.action]

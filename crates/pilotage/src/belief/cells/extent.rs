@@ -3,7 +3,7 @@
 use super::grid::{Axis, Grid};
 use super::unsupported;
 use crate::error::Result;
-use crate::model::{Doing, Dynamics, Interval, Model, StartHypothesis, VariableKind};
+use crate::model::{Dynamics, Interval, Model, StartHypothesis, VariableKind};
 
 /// Cells along a variable where the model does not say, for one and for two variables.
 const CELLS: [usize; 2] = [200, 40];
@@ -125,24 +125,17 @@ fn narrowest(model: &Model, dynamics: &Dynamics, variable: usize) -> Option<f64>
     let regions = rewards.chain(model.events.iter().map(|event| &event.region));
     let sides = regions.map(|region| region.side(variable).width());
     let mut least = sides.fold(f64::INFINITY, f64::min);
-    for mode in 0..dynamics.modes() {
-        for action in 0..dynamics.actions() {
-            let doing = Doing {
-                mode,
-                action,
-                step: 0,
-            };
-            let moved = dynamics.constant_transition_noise(doing)?[variable * (n + 1)];
-            least = least.min(moved.max(0.0).sqrt());
-            let (rows, noise) = (
-                dynamics.linear_observation(doing)?,
-                dynamics.constant_observation_noise(doing)?,
-            );
-            for k in 0..m {
-                let slope = rows[k * n + variable].abs();
-                if slope > 0.0 {
-                    least = least.min(noise[k * (m + 1)].max(0.0).sqrt() / slope);
-                }
+    for doing in dynamics.doings() {
+        let moved = dynamics.constant_transition_noise(doing)?[variable * (n + 1)];
+        least = least.min(moved.max(0.0).sqrt());
+        let (rows, noise) = (
+            dynamics.linear_observation(doing)?,
+            dynamics.constant_observation_noise(doing)?,
+        );
+        for k in 0..m {
+            let slope = rows[k * n + variable].abs();
+            if slope > 0.0 {
+                least = least.min(noise[k * (m + 1)].max(0.0).sqrt() / slope);
             }
         }
     }
@@ -239,15 +232,8 @@ fn moves<'a>(
     dynamics: &'a Dynamics,
 ) -> impl Iterator<Item = (Vec<f64>, Vec<f64>, Vec<f64>)> + 'a {
     let n = model.state_dim();
-    let ways = (0..model.modes.len())
-        .flat_map(|mode| (0..model.actions.len()).map(move |action| (mode, action)));
     let of = move |start: &'a StartHypothesis| {
-        ways.clone().map(move |(mode, action)| {
-            let doing = Doing {
-                mode,
-                action,
-                step: 0,
-            };
+        dynamics.doings().map(move |doing| {
             let from = start.mean.as_slice();
             let (mut to, mut noise) = (vec![0.0; n], vec![0.0; n * n]);
             dynamics.transition(doing, from, &mut to);
