@@ -40,8 +40,10 @@ pub fn evaluation(evaluation: &Evaluation, planned: Option<f64>) -> String {
 /// What a solution earns: as planned, where its model holds, and in the world; one line where the last two are the same thing.
 pub fn earned(earned: &Earned, planned: Option<f64>, as_assumed: bool) -> String {
     let rule = earned.rule.as_ref().map_or(String::new(), |rule| {
-        let rule = estimate(&rule.discounted);
-        format!("  rule of thumb        {rule}, the one in the model file\n")
+        let (own, less) = (estimate(&rule.earned.discounted), estimate(&rule.less));
+        format!(
+            "  rule of thumb        {own}, the one in the model file\n  less than the above  {less} over the same episodes\n"
+        )
     });
     if as_assumed {
         return evaluation(&earned.world, planned) + &rule;

@@ -66,6 +66,9 @@ struct Published {
     source: String,
 }
 
+/// Mean and standard error of what a rule of thumb earns, and of how much less that is, over the same episodes.
+type Beside = ((f64, f64), (f64, f64));
+
 /// What was measured of an automaton.
 #[derive(Serialize, Deserialize)]
 struct Row {
@@ -74,7 +77,7 @@ struct Row {
     nodes: usize,
     planned: f64,
     earned: (f64, f64),
-    rule: Option<(f64, f64)>,
+    rule: Option<Beside>,
     solver: String,
     /// Processor time of planning and compiling, all cores together.
     seconds: Option<f64>,
@@ -138,7 +141,7 @@ fn heading() -> String {
         "# Benchmarks\n\n\
          Problems in which what is sensed depends on the place, or says yes or no, modes are hidden, or walls stop the way. *Planned* is what the first planner for \
          the problem promises; *earned* is the discounted return of its automaton, a decision tree, where the model holds, mean ± standard error over {EPISODES} \
-         episodes; the rule of thumb is the one in the model file, on the same belief. Time is processor time of planning and compiling, memory the most that was \
+         episodes; the rule of thumb is the one in the model file, on the same belief and in the same episodes. Time is processor time of planning and compiling, memory the most that was \
          held. Nothing was set but the most nodes, and that no return may be lost by fewer. Version {}, seed {SEED}; made by\n\n\
          ```sh\ncargo run --release -p pilotage --example benchmarks -- --out docs/benchmarks.md\n```\n",
         env!("CARGO_PKG_VERSION")
@@ -150,7 +153,7 @@ fn gallery_heading() -> String {
         "# Gallery\n\n\
          Problems that people have, each a model file in [models/gallery](../models/gallery) with a rule of thumb that an engineer would write. Each is solved as \
          `pilotage solve NAME --loss 0` does, no return being lost by fewer nodes, and with `--nodes {GALLERY_NODES}` for an automaton to look at. *Earned* is the discounted return of the automaton where the model holds, mean ± standard error over {GALLERY_EPISODES} \
-         episodes; the rule acts on the same belief in the same episodes. Where what was planned misses what is earned, the remark says why. Maps show what the \
+         episodes; the rule acts on the same belief in the same episodes, which is why *more than the rule* is known better than either. Where what was planned misses what is earned, the remark says why. Maps show what the \
          automaton does: the mean of the belief across and up, how sure it is in the panels. Version {}, seed {SEED}; made by\n\n\
          ```sh\nscripts/gallery.sh\n```\n",
         env!("CARGO_PKG_VERSION")
@@ -207,7 +210,7 @@ fn section(problem: &Problem) -> Result<String, Box<dyn Error>> {
 }
 
 /// Heads of the columns.
-const HEAD: &str = "| nodes at most | nodes | planner | planned | earned | rule of thumb | CPU seconds | MiB |\n|--:|--:|---|--:|--:|--:|--:|--:|\n";
+const HEAD: &str = "| nodes at most | nodes | planner | planned | earned | rule of thumb | more than the rule | CPU seconds | MiB |\n|--:|--:|---|--:|--:|--:|--:|--:|--:|\n";
 
 /// What agents earn that are told their start, each with a plan of its own.
 fn told(rows: &[Row], digits: usize) -> String {
@@ -256,15 +259,20 @@ fn in_its_own_process(
 impl Row {
     fn line(&self, digits: usize) -> String {
         let estimate = |(mean, stderr): (f64, f64)| format!("{mean:.digits$} ± {stderr:.digits$}");
+        let rule = |of: fn(Beside) -> (f64, f64)| match self.rule {
+            Some(rule) => estimate(of(rule)),
+            None => "-".to_owned(),
+        };
         format!(
-            "| {} | {} | {} | {:.digits$} | {} | {} | {} | {} |\n",
+            "| {} | {} | {} | {:.digits$} | {} | {} | {} | {} | {} |\n",
             self.most
                 .map_or_else(|| "-".to_owned(), |most| most.to_string()),
             self.nodes,
             self.solver,
             self.planned,
             estimate(self.earned),
-            self.rule.map_or_else(|| "-".to_owned(), estimate),
+            rule(|rule| rule.0),
+            rule(|rule| rule.1),
             whole(self.seconds),
             whole(self.mebibytes),
         )
@@ -307,7 +315,9 @@ fn measure(
         nodes: automaton.map_or(0, |automaton| automaton.nodes.len()),
         planned: solution.planned_value.unwrap_or(f64::NAN),
         earned: pair(earned.assumed.discounted),
-        rule: earned.rule.map(|rule| pair(rule.discounted)),
+        rule: earned
+            .rule
+            .map(|rule| (pair(rule.earned.discounted), pair(rule.less))),
         solver: entry.name().to_owned(),
         seconds,
         mebibytes: peak(),

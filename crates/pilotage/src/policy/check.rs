@@ -426,17 +426,26 @@ impl RecallTable {
     }
 }
 
+fn check_feature(feature: Feature, sizes: &Sizes) -> Checked {
+    match feature {
+        Feature::Mean(variable) | Feature::Deviation(variable) => {
+            index(variable, sizes.states, "state variables")
+        }
+        Feature::Mode(mode) => sizes.mode(&mode),
+        Feature::Step => Ok(()),
+    }
+}
+
 /// Tests lead forward only, so that every belief arrives at a node.
 fn check_tree(tests: &[Test], sizes: &Sizes) -> Checked {
     let numbered: Vec<(usize, &Test)> = tests.iter().enumerate().collect();
     each(&numbered, |(number_, test)| {
-        match test.feature {
-            Feature::Mean(variable) | Feature::Deviation(variable) => {
-                index(variable, sizes.states, "state variables").at("feature")?;
-            }
-            Feature::Mode(mode) => sizes.mode(&mode).at("feature")?,
-            Feature::Step => {}
-        }
+        check_feature(test.feature, sizes).at("feature")?;
+        each(&test.plus, |term| {
+            number(term.times).at("times")?;
+            check_feature(term.feature, sizes).at("feature")
+        })
+        .at("plus")?;
         number(test.less_than).at("less_than")?;
         for (key, branch) in [("yes", test.yes), ("no", test.no)] {
             match branch {

@@ -29,7 +29,7 @@ pub use graph::{Exit, GraphNode, GraphRunner, PolicyGraph};
 pub use runner::AutomatonRunner;
 pub use saved::Saved;
 pub(crate) use tree::{Asked, StratumFeatures};
-pub use tree::{Branch, Feature, Test, Tree};
+pub use tree::{Branch, Feature, Term, Test, Tree};
 
 use crate::belief::{Belief, Held};
 use crate::model::ActionId;

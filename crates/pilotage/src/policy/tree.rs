@@ -31,18 +31,31 @@ pub enum Branch {
     Test(usize),
 }
 
-/// A question: whether a feature is less than a number.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// A question: whether a feature, or a weighted sum of features, is less than a number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "an object")]
 pub struct Test {
     /// What is asked for.
     pub feature: Feature,
+    /// What is added to it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub plus: Vec<Term>,
     /// The number.
     pub less_than: f64,
     /// Where to go on if it is less.
     pub yes: Branch,
     /// Where to go on if it is not.
     pub no: Branch,
+}
+
+/// A part of a weighted sum of features.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "an object")]
+pub struct Term {
+    /// The weight, finite.
+    pub times: f64,
+    /// What it weighs.
+    pub feature: Feature,
 }
 
 /// A decision tree over beliefs. It begins with the first test; without tests, all beliefs are at node 0.
@@ -56,6 +69,12 @@ pub struct Tree {
 pub(crate) trait Asked {
     /// What a feature is.
     fn feature(&self, feature: Feature) -> f64;
+
+    /// Whether the answer to a test is yes.
+    fn passes(&self, test: &Test) -> bool {
+        let add = |sum, term: &Term| sum + term.times * self.feature(term.feature);
+        test.plus.iter().fold(self.feature(test.feature), add) < test.less_than
+    }
 }
 
 /// A belief in full answers for itself.
@@ -128,7 +147,7 @@ impl Tree {
                 Branch::Node(node) => return node,
                 Branch::Test(test) => {
                     let test = &self.tests[test];
-                    branch = match belief.feature(test.feature) < test.less_than {
+                    branch = match belief.passes(test) {
                         true => test.yes,
                         false => test.no,
                     };
@@ -174,13 +193,27 @@ impl Automaton {
             }
             Branch::Test(test) => {
                 let test = &tree.tests[test];
-                let asked = self.feature_name(test.feature);
-                lines.push(format!("{indent}if {asked} < {}:", rounded(test.less_than)));
+                let (asked, number) = (self.asked(test), rounded(test.less_than));
+                lines.push(format!("{indent}if {asked} < {number}:"));
                 self.write_branch(tree, test.yes, depth + 1, lines);
                 lines.push(format!("{indent}else:"));
                 self.write_branch(tree, test.no, depth + 1, lines);
             }
         }
+    }
+
+    /// What a test asks for, as in `x - 2*y`.
+    fn asked(&self, test: &Test) -> String {
+        let mut asked = self.feature_name(test.feature);
+        for Term { times, feature } in &test.plus {
+            let sign = if *times < 0.0 { '-' } else { '+' };
+            let name = self.feature_name(*feature);
+            asked += &match rounded(times.abs()) {
+                1.0 => format!(" {sign} {name}"),
+                times => format!(" {sign} {times}*{name}"),
+            };
+        }
+        asked
     }
 
     /// What a feature is called: the state variable, its standard deviation `sd_x`, the probability `p_m` of a mode.

@@ -140,20 +140,35 @@ pub fn compare_agents(
     options: Options,
     observer: &dyn Progress,
 ) -> Difference {
-    let mut difference = Moments::default();
+    evaluate_both(scenario, (first, second), options, observer).1
+}
+
+/// What two agents earn in the same worlds with the same noise, and how much more the first earns.
+pub fn evaluate_both(
+    scenario: &Scenario,
+    (first, second): (&Agents<'_, '_>, &Agents<'_, '_>),
+    options: Options,
+    observer: &dyn Progress,
+) -> ([Evaluation; 2], Difference) {
+    let [mut ours, mut theirs] = [Tally::default(), Tally::default()];
+    let mut gain = Moments::default();
     let runner = || {
         let mut first = episodes(scenario, first(), options);
         let mut second = episodes(scenario, second(), options);
-        Box::new(move |episode| first(episode).discounted - second(episode).discounted) as Runner<_>
+        Box::new(move |episode| (first(episode), second(episode))) as Runner<_>
     };
     run_all(
         options.episodes,
         "episodes",
         observer,
         &runner,
-        &mut |gain| difference.add(gain),
+        &mut |(first, second): (Episode, Episode)| {
+            gain.add(first.discounted - second.discounted);
+            ours.add(&first);
+            theirs.add(&second);
+        },
     );
-    difference.estimate()
+    ([ours.evaluation(), theirs.evaluation()], gain.estimate())
 }
 
 /// Something that runs the episode of a number.
@@ -214,35 +229,52 @@ pub(crate) fn summarise<'a>(
     observer: &dyn Progress,
     runner: &(dyn Fn() -> Runner<'a, Episode> + Sync),
 ) -> Evaluation {
-    let [mut discounted, mut undiscounted, mut steps] = [Moments::default(); 3];
-    let (mut failed, mut lost): (u64, Option<Lost>) = (0, None);
+    let mut tally = Tally::default();
     run_all(
         options.episodes,
         "episodes",
         observer,
         runner,
-        &mut |episode: Episode| {
-            if episode.lost {
-                let number = discounted.count();
-                let first = Lost {
-                    episode: number,
-                    step: episode.steps,
-                    episodes: 0,
-                };
-                lost.get_or_insert(first).episodes += 1;
-            }
-            discounted.add(episode.discounted);
-            undiscounted.add(episode.undiscounted);
-            steps.add(episode.steps as f64);
-            failed += u64::from(episode.failed);
-        },
+        &mut |episode: Episode| tally.add(&episode),
     );
-    Evaluation {
-        episodes: options.episodes,
-        discounted: discounted.estimate(),
-        undiscounted: undiscounted.estimate(),
-        steps: steps.estimate(),
-        failed: failed as f64 / options.episodes as f64,
-        lost,
+    tally.evaluation()
+}
+
+/// What was earned in the episodes so far.
+#[derive(Default)]
+struct Tally {
+    discounted: Moments,
+    undiscounted: Moments,
+    steps: Moments,
+    failed: u64,
+    lost: Option<Lost>,
+}
+
+impl Tally {
+    fn add(&mut self, episode: &Episode) {
+        if episode.lost {
+            let first = Lost {
+                episode: self.discounted.count(),
+                step: episode.steps,
+                episodes: 0,
+            };
+            self.lost.get_or_insert(first).episodes += 1;
+        }
+        self.discounted.add(episode.discounted);
+        self.undiscounted.add(episode.undiscounted);
+        self.steps.add(episode.steps as f64);
+        self.failed += u64::from(episode.failed);
+    }
+
+    fn evaluation(&self) -> Evaluation {
+        let episodes = self.discounted.count();
+        Evaluation {
+            episodes: episodes as usize,
+            discounted: self.discounted.estimate(),
+            undiscounted: self.undiscounted.estimate(),
+            steps: self.steps.estimate(),
+            failed: self.failed as f64 / episodes as f64,
+            lost: self.lost,
+        }
     }
 }

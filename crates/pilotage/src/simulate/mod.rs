@@ -20,7 +20,7 @@ pub use estimate::Estimate;
 pub(crate) use evaluate::summarise;
 pub use evaluate::{
     Agents, Difference, Evaluation, Lost, Options, compare, compare_agents, evaluate,
-    evaluate_agent,
+    evaluate_agent, evaluate_both,
 };
 pub use hand::{HandAgent, Told};
 pub use life::{Life, LifeOptions, Run, life};

@@ -62,7 +62,7 @@ pub use lqg::Lqg;
 pub use mls::Mls;
 pub use point_based::PointBased;
 pub use policy_search::PolicySearch;
-pub use promise::Earned;
+pub use promise::{ByRule, Earned};
 pub use qmdp::Qmdp;
 pub use registry::{Entry, Registry};
 pub use run::{learn, plan, solve};

@@ -1,12 +1,14 @@
 //! What a plan promises, and what it earns: where its model holds, and in the world.
 
+use serde::Serialize;
+
 use super::{Solution, Solved};
 use crate::belief::{BeliefMdp, Codebook, Updater};
 use crate::error::Result;
 use crate::model::{HypothesisBelief, Model, WallBelief};
 use crate::progress::Progress;
 use crate::scenario::{Scenario, Walls};
-use crate::simulate::{Agent, Evaluation, HandAgent, Options, Told, evaluate_agent};
+use crate::simulate::{Agent, Difference, Evaluation, HandAgent, Options, Told, evaluate_both};
 
 /// What a solution earns, beside its promise ([`Solution::planned_value`]). All are returns over an episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,9 +18,19 @@ pub struct Earned {
     /// In the scenario's world; the same where that is the one assumed.
     pub world: Evaluation,
     /// What the scenario's rule of thumb earns in its world on the same beliefs, where it has one.
-    pub rule: Option<Evaluation>,
+    pub rule: Option<ByRule>,
     /// What is to be known of the difference, and of the plan.
     pub remarks: Vec<String>,
+}
+
+/// What a rule of thumb earns.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ByRule {
+    /// What it earns itself.
+    #[serde(flatten)]
+    pub earned: Evaluation,
+    /// By how much that is less than what the solution earns, over the same episodes.
+    pub less: Difference,
 }
 
 impl Earned {
@@ -46,7 +58,10 @@ impl Solution {
         options: Options,
         observer: &dyn Progress,
     ) -> Result<Earned> {
-        let world = self.evaluate(scenario, options, observer)?;
+        let (world, rule) = match self.beside_rule(scenario, options, observer)? {
+            Some((world, rule)) => (world, Some(rule)),
+            None => (self.evaluate(scenario, options, observer)?, None),
+        };
         let assumed = match scenario.is_as_assumed() {
             true => world,
             false => self.evaluate(&Scenario::assumed(&scenario.model), options, observer)?,
@@ -78,15 +93,13 @@ impl Solution {
         {
             remarks.push("the world has walls, and the belief does not know of them: the plan expects another return than is earned; write `walls = \"clip\"` in [belief]".to_owned());
         }
-        let rule = self.by_rule(scenario, options, observer)?;
-        if let Some(rule) = &rule {
-            let (ours, theirs) = (&world.discounted, &rule.discounted);
-            if theirs.mean - ours.mean > 3.0 * theirs.stderr.hypot(ours.stderr) {
-                remarks.push(format!(
-                    "the rule of thumb in the model file earns more, {:.4} ± {:.4}",
-                    theirs.mean, theirs.stderr
-                ));
-            }
+        if let Some(ByRule { earned, less }) = &rule
+            && less.mean < -3.0 * less.stderr
+        {
+            remarks.push(format!(
+                "the rule of thumb in the model file earns more, {:.4} ± {:.4}",
+                earned.discounted.mean, earned.discounted.stderr
+            ));
         }
         Ok(Earned {
             assumed,
@@ -98,14 +111,14 @@ impl Solution {
 }
 
 impl Solution {
-    /// What the scenario's rule of thumb earns on beliefs that are kept as those of this solution, but about all that the model says, or, where
-    /// it keeps none, as the model asks.
-    fn by_rule(
+    /// What this earns in the scenario's world, and what its rule of thumb does in the same episodes. The rule acts on beliefs that are kept as
+    /// those of this solution, but about all that the model says, or, where it keeps none, as the model asks.
+    fn beside_rule(
         &self,
         scenario: &Scenario,
         options: Options,
         observer: &dyn Progress,
-    ) -> Result<Option<Evaluation>> {
+    ) -> Result<Option<(Evaluation, ByRule)>> {
         let Some(rule) = scenario.rule.as_ref() else {
             return Ok(None);
         };
@@ -117,8 +130,11 @@ impl Solution {
         let space = updater.space(&scenario.model);
         let told = Told::of(space.as_ref());
         let keeper = space.updater();
-        let agent = || -> Box<dyn Agent + '_> { Box::new(HandAgent::new(&keeper, rule, &told)) };
-        Ok(Some(evaluate_agent(scenario, &agent, options, observer)))
+        let hand = || -> Box<dyn Agent + '_> { Box::new(HandAgent::new(&keeper, rule, &told)) };
+        let both = self.acting(|own| evaluate_both(scenario, (own, &hand), options, observer));
+        Ok(both
+            .ok()
+            .map(|([own, earned], less)| (own, ByRule { earned, less })))
     }
 
     /// How many strata beliefs are read as, where they are kept in full.

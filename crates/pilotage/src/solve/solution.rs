@@ -8,8 +8,7 @@ use crate::policy::{Automaton, AutomatonRunner, GraphRunner, Matching, Policy, P
 use crate::progress::Progress;
 use crate::scenario::Scenario;
 use crate::simulate::{
-    Agent, Difference, Evaluation, Options, TrackingAgent, compare, compare_agents, evaluate,
-    evaluate_agent,
+    Agent, Agents, Difference, Evaluation, Options, TrackingAgent, compare_agents, evaluate_agent,
 };
 
 /// Form of the policy a planner hands over. Learners hand over the form they learned.
@@ -170,27 +169,36 @@ impl Solution {
         options: Options,
         observer: &dyn Progress,
     ) -> Option<Difference> {
-        let Solved::Rule { policy, updater } = &planner.policy else {
+        let (Solved::Rule { .. }, Solved::Automaton(_) | Solved::Graph(_)) =
+            (&planner.policy, &self.policy)
+        else {
             return None;
         };
-        let planner: &dyn Policy = policy.as_ref();
+        let compared = planner.acting(|planner| {
+            self.acting(|own| compare_agents(scenario, planner, own, options, observer))
+        });
+        compared.ok()?.ok()
+    }
+
+    /// Hands over agents that act by this solution, on a belief or on readings alone; `Err` with a free control, by which none does.
+    pub(super) fn acting<T>(
+        &self,
+        hand_over: impl FnOnce(&Agents<'_, '_>) -> T,
+    ) -> std::result::Result<T, &LqgController> {
+        fn tracking<'a>(
+            updater: &'a Updater,
+            policy: &'a dyn Policy,
+        ) -> impl Fn() -> Box<dyn Agent + 'a> + Sync {
+            move || Box::new(TrackingAgent::new(updater, policy))
+        }
         match &self.policy {
             Solved::Automaton(automaton) => {
-                let compiled = AutomatonRunner::new(automaton);
-                let compiled: &dyn Policy = &compiled;
-                Some(compare(
-                    scenario, updater, planner, compiled, options, observer,
-                ))
+                let runner = AutomatonRunner::new(automaton);
+                Ok(hand_over(&tracking(&automaton.updater, &runner)))
             }
-            Solved::Graph(graph) => {
-                let planner =
-                    || -> Box<dyn Agent + '_> { Box::new(TrackingAgent::new(updater, planner)) };
-                let compiled = || -> Box<dyn Agent> { Box::new(GraphRunner::new(graph)) };
-                Some(compare_agents(
-                    scenario, &planner, &compiled, options, observer,
-                ))
-            }
-            Solved::Control(_) | Solved::Rule { .. } => None,
+            Solved::Rule { policy, updater } => Ok(hand_over(&tracking(updater, policy.as_ref()))),
+            Solved::Graph(graph) => Ok(hand_over(&|| Box::new(GraphRunner::new(graph)))),
+            Solved::Control(controller) => Err(controller),
         }
     }
 
@@ -204,19 +212,10 @@ impl Solution {
         options: Options,
         observer: &dyn Progress,
     ) -> Result<Evaluation> {
-        Ok(match &self.policy {
-            Solved::Automaton(automaton) => {
-                let controller = AutomatonRunner::new(automaton);
-                evaluate(scenario, &automaton.updater, &controller, options, observer)
-            }
-            Solved::Graph(graph) => {
-                let agent = || -> Box<dyn Agent> { Box::new(GraphRunner::new(graph)) };
-                evaluate_agent(scenario, &agent, options, observer)
-            }
-            Solved::Control(controller) => controller.evaluate(scenario, options, observer)?,
-            Solved::Rule { policy, updater } => {
-                evaluate(scenario, updater, policy.as_ref(), options, observer)
-            }
-        })
+        self.acting(|agents| evaluate_agent(scenario, agents, options, observer))
+            .map_or_else(
+                |controller| controller.evaluate(scenario, options, observer),
+                Ok,
+            )
     }
 }

@@ -1,5 +1,6 @@
 //! Beliefs with what every action costs there: what trees are grown on.
 
+use super::cuts::{Cut, Pair};
 use crate::belief::{Belief, BeliefSpace};
 use crate::policy::{Asked, Automaton, Feature, StratumFeatures};
 use crate::solve::rollout::Judged;
@@ -8,6 +9,8 @@ use crate::solve::rollout::Judged;
 pub(super) struct Collected {
     /// What is known of each belief.
     pub(super) features: Vec<Feature>,
+    /// Those that a test may ask for together.
+    pub(super) pairs: Vec<Pair>,
     pub(super) actions: usize,
     pub(super) beliefs: Vec<Belief>,
     /// By feature and belief.
@@ -29,6 +32,7 @@ impl Collected {
         let features = features(space, automaton);
         Self {
             columns: vec![Vec::new(); features.len()],
+            pairs: pairs(&features),
             features,
             actions: space.model().actions.len(),
             beliefs: Vec::new(),
@@ -100,10 +104,19 @@ impl Collected {
         counts.sum()
     }
 
-    /// Members on either side of a test, in the same orders.
-    pub(super) fn parted(&self, members: Members, feature: usize, less_than: f64) -> [Members; 2] {
+    /// Standard deviation of a feature among members.
+    pub(super) fn spread(&self, feature: usize, members: &[u32]) -> f64 {
         let column = &self.columns[feature];
-        let below = |member: &u32| column[*member as usize] < less_than;
+        let values = || members.iter().map(|member| column[*member as usize]);
+        let count = members.len().max(1) as f64;
+        let mean = values().sum::<f64>() / count;
+        let squares = values().map(|value| (value - mean).powi(2));
+        (squares.sum::<f64>() / count).sqrt()
+    }
+
+    /// Members on either side of a test, in the same orders.
+    pub(super) fn parted(&self, members: Members, cut: Cut) -> [Members; 2] {
+        let below = |member: &u32| cut.is_below(self, *member);
         let parted = members
             .into_iter()
             .map(|order| order.into_iter().partition(below));
@@ -127,4 +140,25 @@ fn features(space: &dyn BeliefSpace, automaton: &Automaton) -> Vec<Feature> {
         .chain(modes.map(Feature::Mode))
         .chain((space.model().clock() > 0).then_some(Feature::Step))
         .collect()
+}
+
+/// What the tree may ask for together: two means, two probabilities of modes.
+fn pairs(features: &[Feature]) -> Vec<Pair> {
+    let numbered = || features.iter().enumerate();
+    let of = |(i, first): (usize, &Feature)| -> Vec<Pair> {
+        let later = numbered().skip(i + 1);
+        let pair = |(j, second): (usize, &Feature)| {
+            let alike = match (first, second) {
+                (Feature::Mean(_), Feature::Mean(_)) => false,
+                (Feature::Mode(_), Feature::Mode(_)) => true,
+                _ => return None,
+            };
+            Some(Pair {
+                features: [i, j],
+                alike,
+            })
+        };
+        later.filter_map(pair).collect()
+    };
+    numbered().flat_map(of).collect()
 }

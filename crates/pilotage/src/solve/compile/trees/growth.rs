@@ -4,6 +4,7 @@
 //! of use by itself. So growth looks two tests ahead, at coarse cuts; where exactly a test lies is found afterwards ([`super::shape`]).
 
 use super::collected::{Collected, Members};
+use super::cuts::{Along, Cut, Stakes};
 use super::shape::{Shape, cheapest};
 use crate::parallel;
 
@@ -16,12 +17,8 @@ pub(super) const LEAST: f64 = 1e-3;
 /// What saves less than this share of a leaf's cost saves nothing.
 const NOTHING: f64 = 1e-9;
 
-/// A test.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Cut {
-    pub(super) feature: usize,
-    pub less_than: f64,
-}
+/// A slanted test saves so many times as much as another, since it takes longer to read.
+const SLANTED: f64 = 1.1;
 
 /// A leaf of a tree as it grows, with the test that it would be given.
 struct Bud {
@@ -34,18 +31,26 @@ struct Bud {
 pub(super) struct Growth<'a> {
     collected: &'a Collected,
     least: f64,
+    /// Whether tests may be slanted.
+    slanted: bool,
     buds: Vec<Bud>,
     shape: Shape,
 }
 
 impl<'a> Growth<'a> {
-    /// A tree of one leaf, to which all beliefs come.
-    pub(super) fn new(collected: &'a Collected, members: Members) -> Self {
+    /// Trees of one leaf, to which all beliefs come: one that grows straight tests alone, and one that grows slanted ones too. What saves most
+    /// at first is not always what saves most in the end.
+    pub(super) fn straight_and_slanted(collected: &'a Collected, members: &Members) -> [Self; 2] {
+        [false, true].map(|slanted| Self::new(collected, members.clone(), slanted))
+    }
+
+    fn new(collected: &'a Collected, members: Members, slanted: bool) -> Self {
         let first = members.first().map_or(&[][..], Vec::as_slice);
         let shape = Shape::leaf(cheapest(&collected.sums(first)));
         let mut growth = Self {
             least: LEAST * collected.counted(first),
             collected,
+            slanted,
             buds: Vec::new(),
             shape,
         };
@@ -67,9 +72,7 @@ impl<'a> Growth<'a> {
                 break;
             };
             let bud = self.buds.swap_remove(most);
-            let parts = self
-                .collected
-                .parted(bud.members, cut.feature, cut.less_than);
+            let parts = self.collected.parted(bud.members, cut);
             let actions = [0, 1].map(|side: usize| cheapest(&self.collected.sums(&parts[side][0])));
             let ends = self.shape.split(bud.spot, cut, actions);
             for (end, members) in ends.into_iter().zip(parts) {
@@ -96,13 +99,30 @@ impl<'a> Growth<'a> {
         if cost <= 0.0 || first.len() < 2 {
             return None;
         }
+        let stakes = Stakes {
+            collected: self.collected,
+            members,
+            rows: &self.collected.costs,
+            width: self.collected.actions,
+            cost: |below: &[f64], all: &[f64]| {
+                let above = all.iter().zip(below).map(|(all, below)| all - below);
+                least(below.iter().copied()) + least(above)
+            },
+            least: self.least,
+        };
         let features = self.collected.features.len();
-        let one = parallel::map(features, |feature| self.one(feature, members, &sums));
+        let straight = parallel::map(features, |feature| stakes.straight(feature));
+        let straight = straight
+            .into_iter()
+            .flatten()
+            .map(|(left, cut)| (cut, cost - left));
+        let slanted = self.slanted.then(|| stakes.slanted(None)).flatten();
+        let slanted = slanted.map(|(left, cut)| (cut, (cost - left) / SLANTED));
         let bins: Vec<Bins> = (0..features)
             .map(|feature| Bins::new(self.collected, feature, &members[feature]))
             .collect();
         let two = parallel::map(features, |feature| self.two(feature, &bins, first, &sums));
-        let all = one.into_iter().chain(two).flatten();
+        let all = straight.chain(two.into_iter().flatten()).chain(slanted);
         all.filter(|(_, saved)| *saved > NOTHING * cost).fold(
             None,
             |best: Option<(Cut, f64)>, next| match best {
@@ -110,34 +130,6 @@ impl<'a> Growth<'a> {
                 _ => Some(next),
             },
         )
-    }
-
-    /// The test of a feature that saves most by itself.
-    fn one(&self, feature: usize, members: &Members, sums: &[f64]) -> Option<(Cut, f64)> {
-        let collected = self.collected;
-        let order = &members[feature];
-        let column = &collected.columns[feature];
-        let own = collected.counted(order);
-        let cost = sums[cheapest(sums)];
-        let (mut below, mut counted) = (vec![0.0; collected.actions], 0.0);
-        let mut best: Option<(Cut, f64)> = None;
-        for pair in order.windows(2) {
-            let (here, next) = (column[pair[0] as usize], column[pair[1] as usize]);
-            for (sum, cost) in below.iter_mut().zip(collected.costs_of(pair[0])) {
-                *sum += cost;
-            }
-            counted += collected.counts[pair[0] as usize];
-            if here >= next || counted < self.least || own - counted < self.least {
-                continue;
-            }
-            let above = below.iter().zip(sums).map(|(below, sum)| sum - below);
-            let saved = cost - least(below.iter().copied()) - least(above);
-            if saved > best.map_or(0.0, |(_, saved)| saved) {
-                let less_than = 0.5 * (here + next);
-                best = Some((Cut { feature, less_than }, saved));
-            }
-        }
-        best
     }
 
     /// The test of a feature that saves most for each leaf together with one more on either side, or on both.
@@ -180,8 +172,11 @@ impl<'a> Growth<'a> {
                 .map(|(left, leaves)| (cost - left) / leaves)
                 .fold(f64::NEG_INFINITY, f64::max);
             if saved > best.map_or(0.0, |(_, saved)| saved) {
-                let less_than = *less_than;
-                best = Some((Cut { feature, less_than }, saved));
+                let cut = Cut {
+                    along: Along::feature(feature),
+                    less_than: *less_than,
+                };
+                best = Some((cut, saved));
             }
         }
         best

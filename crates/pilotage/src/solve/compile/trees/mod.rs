@@ -11,6 +11,7 @@
 //!    T. Koren and O. Somekh, 2013), and the smallest is taken that earns hardly less than the one that is left.
 
 mod collected;
+mod cuts;
 mod growth;
 mod shape;
 #[cfg(test)]
@@ -20,7 +21,7 @@ use std::collections::VecDeque;
 
 use crate::belief::{BeliefSpace, Pace};
 use crate::policy::{
-    Automaton, AutomatonRunner, Branch, Matching, Node, Place, Policy, Test, Tree,
+    Automaton, AutomatonRunner, Branch, Matching, Node, Place, Policy, Term, Test, Tree,
 };
 use crate::solve::deviation::{self, Budget};
 use crate::solve::rollout::{self, Judged};
@@ -230,7 +231,7 @@ impl Search<'_> {
                 seed,
             ));
             let all = collected.all();
-            let mut growth = Growth::new(&collected, all.clone());
+            let mut growth = Growth::straight_and_slanted(&collected, &all);
             tree = Some(self.of_size((&collected, &all), &mut growth, self.imitated()));
         }
         self.try_sizes(&collected, trials);
@@ -272,7 +273,7 @@ impl Search<'_> {
     /// Tries trees of many sizes, as far as larger ones earn more.
     fn try_sizes(&self, collected: &Collected, trials: &mut Trials) {
         let all = collected.all();
-        let mut growth = Growth::new(collected, all.clone());
+        let mut growth = Growth::straight_and_slanted(collected, &all);
         let sizes = sizes(self.size.nodes);
         let mut left = sizes.as_slice();
         let first = trials.tried.len();
@@ -367,16 +368,23 @@ impl Search<'_> {
         self.seed.wrapping_add((IMITATING + IMPROVING) as u64)
     }
 
-    /// A tree of at most so many nodes: grown larger, made better, and cut back.
+    /// A tree of at most so many nodes: grown larger, made better, and cut back, whichever growth then costs less.
     fn of_size(
         &self,
         (collected, all): (&Collected, &Members),
-        growth: &mut Growth<'_>,
+        growth: &mut [Growth<'_>; 2],
         nodes: usize,
     ) -> Automaton {
-        let mut shape = growth.to(larger(nodes)).clone();
-        shape.refine(collected, all);
-        shape.cut_back(collected, all, nodes);
+        let [straight, slanted] = growth.each_mut().map(|growth| {
+            let mut shape = growth.to(larger(nodes)).clone();
+            shape.refine(collected, all);
+            shape.cut_back(collected, all, nodes);
+            shape
+        });
+        let shape = match slanted.cost(collected) < straight.cost(collected) {
+            true => slanted,
+            false => straight,
+        };
         let mut tree = self.bare.clone();
         write(&shape, collected, &mut tree);
         tree
@@ -429,8 +437,13 @@ fn walk(
         Spot::Leaf(action) => Branch::Node(add(spot, action)),
         Spot::Test(cut, ends) => {
             let number = tree.tests.len();
+            let term = |(times, feature): (f64, usize)| Term {
+                times,
+                feature: collected.features[feature],
+            };
             tree.tests.push(Test {
-                feature: collected.features[cut.feature],
+                feature: collected.features[cut.along.feature],
+                plus: cut.along.plus.map(term).into_iter().collect(),
                 less_than: cut.less_than,
                 yes: Branch::Node(0),
                 no: Branch::Node(0),

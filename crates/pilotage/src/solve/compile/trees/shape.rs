@@ -4,7 +4,8 @@
 //! going along each feature once (tree alternating optimisation: M. Carreira-Perpiñán and P. Tavallali, 2018).
 
 use super::collected::{Collected, Members};
-use super::growth::{Cut, LEAST};
+use super::cuts::{Cut, Stakes};
+use super::growth::LEAST;
 use crate::model::ActionId;
 use crate::parallel;
 
@@ -13,6 +14,9 @@ const PASSES: usize = 8;
 
 /// A pass that saves less than this share of the cost is the last one.
 const LITTLE: f64 = 1e-4;
+
+/// A test becomes slanted if that saves this share of all that is at stake in it.
+const SLANTED: f64 = 0.02;
 
 /// A place in a tree.
 #[derive(Debug, Clone, Copy)]
@@ -58,8 +62,7 @@ impl Shape {
             match self.spots[spot] {
                 Spot::Leaf(action) => return (spot, action),
                 Spot::Test(cut, ends) => {
-                    let value = collected.columns[cut.feature][member as usize];
-                    spot = ends[usize::from(value >= cut.less_than)];
+                    spot = ends[usize::from(!cut.is_below(collected, member))];
                 }
             }
         }
@@ -103,7 +106,7 @@ impl Shape {
             Spot::Test(cut, ends) => {
                 let cut = self.moved(collected, (cut, ends), &members, least);
                 self.spots[spot] = Spot::Test(cut, ends);
-                let parts = collected.parted(members, cut.feature, cut.less_than);
+                let parts = collected.parted(members, cut);
                 for (end, members) in ends.into_iter().zip(parts) {
                     self.refine_below(collected, end, members, least);
                 }
@@ -124,39 +127,31 @@ impl Shape {
             let [yes, no] = ends.map(|end| self.cost_of(collected, end, *member));
             worse[*member as usize] = yes - no;
         }
-        let below =
-            |member: &&u32| collected.columns[cut.feature][**member as usize] < cut.less_than;
-        let now: f64 = members[0]
-            .iter()
-            .filter(below)
-            .map(|member| worse[*member as usize])
-            .sum();
-        let counted = collected.counted(&members[0]);
-        let along = parallel::map(members.len(), |feature| {
-            let column = &collected.columns[feature];
-            let (mut sum, mut count) = (0.0, 0.0);
-            let mut best: Option<(f64, f64)> = None;
-            for pair in members[feature].windows(2) {
-                sum += worse[pair[0] as usize];
-                count += collected.counts[pair[0] as usize];
-                let (here, next) = (column[pair[0] as usize], column[pair[1] as usize]);
-                if here >= next || count < least || counted - count < least {
-                    continue;
-                }
-                if best.is_none_or(|(known, _)| sum < known) {
-                    best = Some((sum, 0.5 * (here + next)));
-                }
-            }
-            best
-        });
-        let all: f64 = members[0]
-            .iter()
-            .map(|member| worse[*member as usize].abs())
-            .sum();
+        let below = |member: &&u32| cut.is_below(collected, **member);
+        let sum = |members: &mut dyn Iterator<Item = &u32>, of: fn(f64) -> f64| -> f64 {
+            members.map(|member| of(worse[*member as usize])).sum()
+        };
+        let now = sum(&mut members[0].iter().filter(below), |worse| worse);
+        let all = sum(&mut members[0].iter(), f64::abs);
+        let stakes = Stakes {
+            collected,
+            members,
+            rows: &worse,
+            width: 1,
+            cost: |below: &[f64], _: &[f64]| below[0],
+            least,
+        };
+        let straight = parallel::map(members.len(), |feature| stakes.straight(feature));
         let mut best = (now - 1e-9 * all, cut);
-        for (feature, found) in along.into_iter().enumerate() {
-            if let Some((sum, less_than)) = found.filter(|(sum, _)| *sum < best.0) {
-                best = (sum, Cut { feature, less_than });
+        for found in straight.into_iter().flatten() {
+            if found.0 < best.0 {
+                best = found;
+            }
+        }
+        if let Some((sum, slanted)) = stakes.slanted(Some(cut.along)) {
+            let price = if cut.is_slanted() { 0.0 } else { SLANTED * all };
+            if sum < best.0 - price {
+                return slanted;
             }
         }
         best.1
@@ -195,10 +190,9 @@ impl Shape {
         let Spot::Test(cut, ends) = self.spots[spot] else {
             return;
         };
-        let column = &collected.columns[cut.feature];
         let (yes, no): (Vec<u32>, Vec<u32>) = members
             .iter()
-            .partition(|member| column[**member as usize] < cut.less_than);
+            .partition(|member| cut.is_below(collected, **member));
         for (gone, kept, stray) in [(ends[1], ends[0], &no), (ends[0], ends[1], &yes)] {
             let more = |member: &u32| {
                 self.cost_of(collected, kept, *member) - self.cost_of(collected, gone, *member)

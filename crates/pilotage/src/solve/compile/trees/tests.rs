@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::collected::Collected;
+use super::cuts::Cut;
 use super::growth::Growth;
 use super::shape::{Shape, Spot};
 use crate::belief::{Belief, BeliefMdp};
@@ -31,6 +32,30 @@ fn collected(beliefs: impl IntoIterator<Item = ([f64; 2], [f64; 2])>) -> Collect
     collected
 }
 
+/// The better of the trees of so many leaves, grown to so many.
+fn tree(collected: &Collected, grown: usize, leaves: usize) -> Shape {
+    let all = collected.all();
+    let shapes = Growth::straight_and_slanted(collected, &all).map(|mut growth| {
+        let mut shape = growth.to(grown).clone();
+        shape.refine(collected, &all);
+        shape.cut_back(collected, &all, leaves);
+        shape
+    });
+    let better = |best: Shape, next: Shape| match next.cost(collected) < best.cost(collected) {
+        true => next,
+        false => best,
+    };
+    shapes.into_iter().reduce(better).unwrap()
+}
+
+fn cuts(shape: &Shape) -> Vec<Cut> {
+    let cuts = shape.spots.iter().filter_map(|spot| match spot {
+        Spot::Test(cut, _) => Some(*cut),
+        Spot::Leaf(_) => None,
+    });
+    cuts.collect()
+}
+
 /// Evenly spread, and what is best there by a rule.
 fn ruled(first: impl Fn(f64, f64) -> bool) -> Collected {
     let side = || (0..40).map(|k| -1.0 + (f64::from(k) + 0.5) / 20.0);
@@ -42,30 +67,37 @@ fn ruled(first: impl Fn(f64, f64) -> bool) -> Collected {
 #[test]
 fn two_questions_are_found_of_which_neither_helps_alone() {
     let collected = ruled(|x, y| (x < 0.2) != (y < -0.3));
-    let mut shape = Growth::new(&collected, collected.all()).to(4).clone();
-    shape.refine(&collected, &collected.all());
-    assert_eq!(shape.cost(&collected), 0.0);
-    assert_eq!(shape.leaves(0), 4);
+    let shape = tree(&collected, 4, 4);
+    assert_eq!((shape.cost(&collected), shape.leaves(0)), (0.0, 4));
+    assert!(cuts(&shape).iter().all(|cut| !cut.is_slanted()));
 }
 
 #[test]
 fn a_rule_is_found_to_its_borders_and_cut_back_to_as_many_leaves_as_it_has() {
     let collected = ruled(|x, y| x < 0.4 && y < 0.7 && y > -0.5);
-    let mut shape = Growth::new(&collected, collected.all()).to(12).clone();
-    shape.refine(&collected, &collected.all());
-    shape.cut_back(&collected, &collected.all(), 12);
+    let shape = tree(&collected, 12, 12);
     assert_eq!((shape.cost(&collected), shape.leaves(0)), (0.0, 4));
-    let mut borders: Vec<i32> = shape
-        .spots
-        .iter()
-        .filter_map(|spot| match spot {
-            Spot::Test(cut, _) => Some((10.0 * cut.less_than).round() as i32),
-            Spot::Leaf(_) => None,
-        })
-        .collect();
+    let border = |cut: &Cut| (10.0 * cut.less_than).round() as i32;
+    let mut borders: Vec<i32> = cuts(&shape).iter().map(border).collect();
     borders.sort_unstable();
     borders.dedup();
     assert_eq!(borders, [-5, 4, 7]);
+}
+
+#[test]
+fn a_slanted_border_takes_one_test() {
+    let collected = ruled(|x, y| x + 3.0 * y < 0.5);
+    let shape = tree(&collected, 8, 8);
+    assert_eq!(shape.leaves(0), 2, "{shape:?}");
+    // Of 1600 beliefs: a slant is found as well as it has to be.
+    assert!(shape.cost(&collected) <= 3.0, "{}", shape.cost(&collected));
+    let cut = cuts(&shape)[0];
+    let Some((times, 1)) = cut.along.plus else {
+        panic!("{cut:?}");
+    };
+    assert_eq!(cut.along.feature, 0);
+    assert!((times - 3.0).abs() < 0.1, "{times}");
+    assert!((cut.less_than - 0.5).abs() < 0.1, "{cut:?}");
 }
 
 proptest! {
@@ -81,17 +113,18 @@ proptest! {
         let beliefs = beliefs.into_iter().map(|((x, y), (a, b))| ([x, y], [a, b]));
         let collected = collected(beliefs);
         let all = collected.all();
-        let mut growth = Growth::new(&collected, collected.all());
-        let alone = growth.to(1).cost(&collected);
-        let mut shape: Shape = growth.to(leaves + 6).clone();
-        prop_assert!(shape.leaves(0) <= leaves + 6);
-        let grown = shape.cost(&collected);
-        shape.refine(&collected, &all);
-        prop_assert!(shape.cost(&collected) <= grown + 1e-9);
-        shape.cut_back(&collected, &all, leaves);
-        prop_assert!(shape.leaves(0) <= leaves);
-        prop_assert!(shape.cost(&collected) <= alone + 1e-9);
-        let members: usize = shape.members(&collected).iter().map(Vec::len).sum();
-        prop_assert_eq!(members, collected.beliefs.len());
+        for mut growth in Growth::straight_and_slanted(&collected, &all) {
+            let alone = growth.to(1).cost(&collected);
+            let mut shape: Shape = growth.to(leaves + 6).clone();
+            prop_assert!(shape.leaves(0) <= leaves + 6);
+            let grown = shape.cost(&collected);
+            shape.refine(&collected, &all);
+            prop_assert!(shape.cost(&collected) <= grown + 1e-9);
+            shape.cut_back(&collected, &all, leaves);
+            prop_assert!(shape.leaves(0) <= leaves);
+            prop_assert!(shape.cost(&collected) <= alone + 1e-9);
+            let members: usize = shape.members(&collected).iter().map(Vec::len).sum();
+            prop_assert_eq!(members, collected.beliefs.len());
+        }
     }
 }
