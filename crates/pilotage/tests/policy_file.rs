@@ -6,9 +6,12 @@ mod common;
 use common::automata::{any_automaton, checksum, empty, number, one_node, sealed};
 use common::built_in;
 use pilotage::Error;
-use pilotage::belief::LARGEST;
+use pilotage::belief::{Belief, LARGEST};
 use pilotage::model::Model;
-use pilotage::policy::{Automaton, AutomatonRunner, Coordinates, Matching, Node, Place};
+use pilotage::policy::{
+    Automaton, AutomatonRunner, Branch, Coordinates, Feature, Matching, Node, Place, Term, Test,
+    Tree,
+};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -164,6 +167,97 @@ fn rich() -> Automaton {
     automaton.nodes = vec![Node::new(0..=0, 0, place, 1, Some(0.5))];
     automaton
 }
+
+/// A tree in the plane that asks for a sum.
+fn grown() -> Automaton {
+    let mut automaton = empty("maze-2d-unbounded", Matching::Tree);
+    let leaf = |x: f64, action| {
+        let place = Place::Segment {
+            lower: vec![x, 0.0],
+            minimum: vec![x, 0.0],
+            upper: vec![x, 0.0],
+        };
+        Node::new(0..=0, 0, place, action, None)
+    };
+    automaton.nodes = vec![leaf(0.0, 0), leaf(1.0, 1), leaf(2.0, 2)];
+    automaton.tree = Some(Tree {
+        tests: vec![
+            Test {
+                feature: Feature::Mean(0),
+                plus: vec![Term {
+                    times: -2.0,
+                    feature: Feature::Mean(1),
+                }],
+                less_than: 0.5,
+                yes: Branch::Node(0),
+                no: Branch::Test(1),
+            },
+            Test {
+                feature: Feature::Deviation(1),
+                plus: Vec::new(),
+                less_than: 1e6,
+                yes: Branch::Node(1),
+                no: Branch::Node(2),
+            },
+        ],
+    });
+    automaton
+}
+
+#[test]
+fn a_tree_that_asks_for_a_sum_is_read_again_shown_and_followed() {
+    let text = grown().to_json().unwrap();
+    let automaton = Automaton::from_json(&text, "policy.json").unwrap();
+    assert_eq!(automaton.tree, grown().tree);
+    let [x, y] = [0, 1].map(|i| automaton.states[i].clone());
+    let first = format!("if {x} - 2*{y} < 0.5:");
+    assert_eq!(automaton.conditions().lines().next(), Some(first.as_str()));
+    let at = |x: f64, y: f64| {
+        automaton.matched(&Belief {
+            stratum: 0,
+            mode: 0,
+            mean: vec![x, y],
+        })
+    };
+    // 2.4 - 2 = 0.4 is less, 2.6 - 2 = 0.6 is not.
+    assert_eq!([at(2.4, 1.0), at(2.6, 1.0)], [Some(0), Some(1)]);
+}
+
+const DAMAGES_OF_A_TREE: &[Damage] = &[
+    (
+        |p| p["tree"][0]["plus"][0]["feature"] = json!({ "mean": 2 }),
+        "tree[0].plus[0].feature",
+        "there are 2 state variables",
+    ),
+    (
+        |p| p["tree"][0]["plus"][0]["times"] = 1e200.into(),
+        "tree[0].plus[0].times",
+        "1e200",
+    ),
+    (
+        |p| {
+            let term = p["tree"][0]["plus"][0].clone();
+            p["tree"][0]["plus"] = Value::Array(vec![term; 7]);
+        },
+        "tree[0].plus",
+        "7 terms, of at most 6",
+    ),
+    (
+        |p| p["tree"][0]["plus"][0]["of"] = 1.into(),
+        "",
+        "unknown field `of`",
+    ),
+    (
+        |p| p["tree"][1]["feature"] = json!({ "mode": 3 }),
+        "tree[1].feature",
+        "there are 1 modes",
+    ),
+    (
+        |p| p["tree"][1]["no"] = json!({ "test": 1 }),
+        "tree[1].no",
+        "which does not come later",
+    ),
+];
 
 /// Changes of a good policy, each with the place and the word that the refusal has.
 type Damage = (fn(&mut Value), &'static str, &'static str);
@@ -568,6 +662,7 @@ fn damaged_policies_are_refused_with_the_place() {
         (one_node(), DAMAGES_OF_ONE_NODE),
         (rich(), DAMAGES_OF_A_RICH_ONE),
         (mapped, DAMAGES_OF_A_MAP),
+        (grown(), DAMAGES_OF_A_TREE),
     ] {
         for (damage, place, word) in damages {
             let reason = refusal_of(&automaton, damage);

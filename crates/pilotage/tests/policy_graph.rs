@@ -114,7 +114,7 @@ fn what_is_planned_is_earned_and_threads_change_nothing() {
     let allowed = 3.0 * got.stderr + 0.02 * planned.abs();
     assert!((planned - got.mean).abs() < allowed, "{planned} {got:?}");
     // The rule of thumb of the model is run on the beliefs that the model asks for.
-    assert!(earned.rule.unwrap().discounted.mean > 2.0);
+    assert!(earned.rule.unwrap().earned.discounted.mean > 2.0);
     let agent = || -> Box<dyn Agent> { Box::new(GraphRunner::new(&graph)) };
     let again = evaluate_agent(&scenario, &agent, options, &Silent);
     assert_eq!(again, earned.world);

@@ -441,6 +441,12 @@ fn check_tree(tests: &[Test], sizes: &Sizes) -> Checked {
     let numbered: Vec<(usize, &Test)> = tests.iter().enumerate().collect();
     each(&numbered, |(number_, test)| {
         check_feature(test.feature, sizes).at("feature")?;
+        // As many as there are features: means, deviations, modes and the step.
+        let most = 2 * sizes.states + sizes.modes + 1;
+        if test.plus.len() > most {
+            let terms = test.plus.len();
+            return Err(Fault::new(format!("{terms} terms, of at most {most}"))).at("plus");
+        }
         each(&test.plus, |term| {
             number(term.times).at("times")?;
             check_feature(term.feature, sizes).at("feature")
