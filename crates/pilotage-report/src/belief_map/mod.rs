@@ -11,7 +11,7 @@ use super::is_sound;
 use super::palette::Paint;
 use super::plot::figure;
 use super::sheet::{Sheet, Sign};
-use pilotage::belief::{BeliefSpace, StratumId};
+use pilotage::belief::{BeliefSpace, Codebook, StratumId, Updater};
 use pilotage::error::{Error, Result};
 use pilotage::model::{Interval, ModeId, Region};
 use pilotage::policy::{Automaton, Node, Place, Policy};
@@ -40,6 +40,7 @@ pub fn belief_map_svg(
     }
     let map = Map {
         space,
+        updater: space.updater(),
         policy,
         automaton,
     };
@@ -73,6 +74,7 @@ fn check(space: &dyn BeliefSpace, automaton: &Automaton) -> Result<()> {
 /// What is drawn.
 struct Map<'a> {
     space: &'a dyn BeliefSpace,
+    updater: Updater,
     policy: &'a dyn Policy,
     automaton: Option<&'a Automaton>,
 }
@@ -227,6 +229,12 @@ impl Map<'_> {
             })
             .map(|(_, _, region)| region)
             .collect()
+    }
+
+    /// By what levels are told apart where the probability of modes is part of them, and none is believed.
+    fn codebook(&self) -> Option<&Codebook> {
+        let codebook = self.updater.codebook();
+        codebook.filter(|_| self.space.model().modes.len() > 1 && !self.remembers())
     }
 
     /// Name of a mode or memory for a heading; empty where there is only one.

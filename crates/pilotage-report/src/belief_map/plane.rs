@@ -9,7 +9,7 @@ use crate::palette::Paint;
 use crate::plot::{Scale, figure};
 use crate::sheet::{MARGIN, Sign, TINT, diamond};
 use crate::svg::{self, Anchor, Element, label, number};
-use pilotage::belief::{Belief, StratumId};
+use pilotage::belief::{Belief, Codebook, StratumId};
 use pilotage::model::{ModeId, Region};
 use pilotage::policy::{Automaton, Matching, Node, Place};
 
@@ -20,16 +20,13 @@ const LONE_SIDE: f64 = 420.0;
 const GAP: f64 = 28.0;
 const HEADING: f64 = 44.0;
 const MOST_LEVELS: usize = 4;
+const MOST_PANELS: usize = 9;
 /// Beliefs asked along the longer side.
 const SAMPLES: usize = 150;
 
 pub fn draw(map: &Map<'_>) -> String {
     let plane = Plane::new(map);
-    let modes = map.modes();
-    let panels: Vec<(ModeId, StratumId)> = modes
-        .iter()
-        .flat_map(|&mode| plane.levels.iter().map(move |&level| (mode, level)))
-        .collect();
+    let panels = &plane.panels;
     let columns = if panels.len() == 4 {
         2
     } else {
@@ -59,13 +56,16 @@ pub fn draw(map: &Map<'_>) -> String {
             .collect();
         sheet.draw(elements, HEADING + plot_height + axes::BELOW);
     }
-    let mut marks = vec![(Sign::Diamond, "start".to_owned())];
-    if modes.iter().any(|&mode| !map.goals(mode).is_empty()) {
+    let mut marks = Vec::new();
+    if panels.iter().any(|&panel| plane.shows_start(panel)) {
+        marks.push((Sign::Diamond, "start".to_owned()));
+    }
+    if panels.iter().any(|(mode, _)| !map.goals(*mode).is_empty()) {
         marks.push((Sign::Frame(Paint::Ink), "where a reward is paid".to_owned()));
     }
     sheet.legend(&map.legend(marks));
     sheet.draw([], 14.0);
-    if let Some(automaton) = map.automaton {
+    if let Some(automaton) = map.automaton.filter(|automaton| shows_nodes(automaton)) {
         sheet.note(match automaton.matching {
             Matching::Nearest if map.space.model().state_dim() == 2 => {
                 "Circles: the automaton's nodes. Thin lines: borders between them."
@@ -79,30 +79,43 @@ pub fn draw(map: &Map<'_>) -> String {
     sheet.finish()
 }
 
+/// Leaves of slanted tests are no boxes, and frames around them would overlap.
+fn shows_nodes(automaton: &Automaton) -> bool {
+    let tests = automaton.tree.iter().flat_map(|tree| &tree.tests);
+    tests.into_iter().all(|test| test.plus.is_empty())
+}
+
 /// Which two variables are drawn, which levels, and what the other variables are.
 struct Plane<'a> {
     map: &'a Map<'a>,
     across: usize,
     up: usize,
     extent: ((f64, f64), (f64, f64)),
-    levels: Vec<StratumId>,
+    panels: Vec<(ModeId, StratumId)>,
 }
 
 impl<'a> Plane<'a> {
     fn new(map: &'a Map<'a>) -> Self {
         let n = map.space.model().state_dim();
         let (across, up) = if n == 2 { (0, 1) } else { most_uncertain(map) };
-        let levels = if n == 2 {
-            chosen_levels(map)
-        } else {
-            vec![map.steady_level()]
+        let panels = match map.codebook() {
+            Some(codebook) if n == 2 => sure_of(map, codebook),
+            _ => {
+                let levels = match n {
+                    2 => chosen_levels(map),
+                    _ => vec![map.steady_level()],
+                };
+                let modes = map.modes().into_iter();
+                let of = |mode| levels.iter().map(move |&level| (mode, level));
+                modes.flat_map(of).collect()
+            }
         };
         Self {
             map,
             across,
             up,
             extent: (map.extent(across), map.extent(up)),
-            levels,
+            panels,
         }
     }
 
@@ -110,8 +123,7 @@ impl<'a> Plane<'a> {
     fn size(&self) -> (f64, f64) {
         let width = |(low, high): (f64, f64)| high - low;
         let ratio = width(self.extent.0) / width(self.extent.1);
-        let modes = self.map.modes().len();
-        let side = if self.levels.len() * modes == 1 {
+        let side = if self.panels.len() == 1 {
             LONE_SIDE
         } else {
             SIDE
@@ -128,7 +140,10 @@ impl<'a> Plane<'a> {
         let (across, up) = (&states[self.across].name, &states[self.up].name);
         let total = self.map.space.strata();
         if states.len() == 2 {
-            let shown = self.levels.len();
+            let mut levels: Vec<StratumId> = self.panels.iter().map(|panel| panel.1).collect();
+            levels.sort_unstable();
+            levels.dedup();
+            let shown = levels.len();
             let of = if shown < total {
                 format!("{shown} of {total}")
             } else {
@@ -158,6 +173,13 @@ impl<'a> Plane<'a> {
             mode,
             mean,
         }
+    }
+
+    /// Whether the start is a belief of a panel.
+    fn shows_start(&self, (mode, level): (ModeId, StratumId)) -> bool {
+        let start = self.map.space.start();
+        // Where how likely modes are belongs to the level, the mode is not asked for.
+        start.stratum == level && (self.map.codebook().is_some() || self.map.start_mode() == mode)
     }
 
     /// Squared distance of a place from the plane, in the automaton's scale.
@@ -211,6 +233,22 @@ fn chosen_levels(map: &Map<'_>) -> Vec<StratumId> {
         .collect()
 }
 
+/// The start, and for each mode the level that is surest of it, most panels at most. Who keeps a belief in full asks how likely modes are, and
+/// believes in none.
+fn sure_of(map: &Map<'_>, codebook: &Codebook) -> Vec<(ModeId, StratumId)> {
+    let panel = |stratum: StratumId| (codebook.stratum(stratum).mode(), stratum);
+    let surest = |mode: ModeId| {
+        let weight = |stratum: &StratumId| codebook.stratum(*stratum).weights[mode];
+        let of_mode = (0..codebook.len()).filter(|&stratum| panel(stratum).0 == mode);
+        of_mode.max_by(|a, b| weight(a).total_cmp(&weight(b)).then(b.cmp(a)))
+    };
+    let start = map.space.start().stratum;
+    let modes = 0..map.space.model().modes.len();
+    let others = modes.filter_map(surest).filter(|&stratum| stratum != start);
+    let all = std::iter::once(start).chain(others);
+    all.map(panel).take(MOST_PANELS).collect()
+}
+
 struct Panel<'a> {
     plane: &'a Plane<'a>,
     mode: ModeId,
@@ -243,7 +281,8 @@ impl Panel<'_> {
         elements.push(self.areas());
         elements.extend(self.walls());
         elements.push(self.frame());
-        if let Some(automaton) = self.plane.map.automaton {
+        let automaton = self.plane.map.automaton;
+        if let Some(automaton) = automaton.filter(|automaton| shows_nodes(automaton)) {
             elements.extend(self.nodes(automaton));
         }
         elements.extend(self.goals());
@@ -254,9 +293,16 @@ impl Panel<'_> {
     fn heading(&self) -> Element {
         let map = self.plane.map;
         let deviations = map.deviations(self.level, &[self.plane.across, self.plane.up]);
-        let text = match map.mode_name(self.mode) {
-            "" => deviations,
-            mode => format!("{mode}, {deviations}"),
+        let weights = map
+            .codebook()
+            .map(|codebook| &codebook.stratum(self.level).weights);
+        let text = match (map.mode_name(self.mode), weights) {
+            ("", _) => deviations,
+            (mode, None) => format!("{mode}, {deviations}"),
+            (mode, Some(weights)) => {
+                let percent = 100.0 * weights[self.mode];
+                format!("{mode} {percent:.0} %, {deviations}")
+            }
         };
         let middle = 0.5 * (self.x.paper.0 + self.x.paper.1);
         label(
@@ -452,7 +498,7 @@ impl Panel<'_> {
 
     fn start(&self) -> Option<Element> {
         let start = self.plane.map.space.start();
-        let here = self.plane.map.start_mode() == self.mode && start.stratum == self.level;
+        let here = self.plane.shows_start((self.mode, self.level));
         here.then(|| {
             diamond(self.point((start.mean[self.plane.across], start.mean[self.plane.up])))
         })
