@@ -1,6 +1,6 @@
 //! Beliefs with what every action costs there: what trees are grown on.
 
-use super::cuts::{Cut, Pair};
+use super::cuts::{Cut, Pair, add};
 use crate::belief::{Belief, BeliefSpace};
 use crate::policy::{Asked, Automaton, Feature, StratumFeatures};
 use crate::solve::rollout::Judged;
@@ -91,9 +91,7 @@ impl Collected {
     pub(super) fn sums(&self, members: &[u32]) -> Vec<f64> {
         let mut sums = vec![0.0; self.actions];
         for member in members {
-            for (sum, cost) in sums.iter_mut().zip(self.costs_of(*member)) {
-                *sum += cost;
-            }
+            add(&mut sums, self.costs_of(*member));
         }
         sums
     }
@@ -102,6 +100,11 @@ impl Collected {
     pub(super) fn counted(&self, members: &[u32]) -> f64 {
         let counts = members.iter().map(|member| self.counts[*member as usize]);
         counts.sum()
+    }
+
+    /// Whether a feature is the probability of a mode.
+    pub(super) fn is_probability(&self, feature: usize) -> bool {
+        matches!(self.features[feature], Feature::Mode(_))
     }
 
     /// Standard deviation of a feature among members.
@@ -147,16 +150,11 @@ fn pairs(features: &[Feature]) -> Vec<Pair> {
     let numbered = || features.iter().enumerate();
     let of = |(i, first): (usize, &Feature)| -> Vec<Pair> {
         let later = numbered().skip(i + 1);
-        let pair = |(j, second): (usize, &Feature)| {
-            let alike = match (first, second) {
-                (Feature::Mean(_), Feature::Mean(_)) => false,
-                (Feature::Mode(_), Feature::Mode(_)) => true,
-                _ => return None,
-            };
-            Some(Pair {
-                features: [i, j],
-                alike,
-            })
+        let pair = |(j, second): (usize, &Feature)| match (first, second) {
+            (Feature::Mean(_), Feature::Mean(_)) | (Feature::Mode(_), Feature::Mode(_)) => {
+                Some([i, j])
+            }
+            _ => None,
         };
         later.filter_map(pair).collect()
     };

@@ -2,7 +2,6 @@
 
 use super::collected::{Collected, Members};
 use crate::parallel;
-use crate::policy::Feature;
 
 /// What a test asks for: a feature, and where it is slanted a multiple of another that is added.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,32 +28,24 @@ const COMPARED: usize = 4_000;
 const BINS: usize = 200;
 
 /// Two features that a test may ask for together.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Pair {
-    pub(super) features: [usize; 2],
-    /// Whether they are of a kind, so that only their sum and their difference say something.
-    pub(super) alike: bool,
-}
+pub(super) type Pair = [usize; 2];
 
-impl Pair {
-    /// Lines to be tried for beliefs.
-    fn slants(self, collected: &Collected, members: &[u32]) -> Vec<Along> {
-        let [feature, other] = self.features;
-        let line = |times: f64| Along {
-            feature,
-            plus: Some((rounded(times), other)),
-        };
-        if self.alike {
-            return [1.0, -1.0].map(line).to_vec();
-        }
-        let spread = |feature| collected.spread(feature, members);
-        let (own, others) = (spread(feature), spread(other));
-        if own <= 0.0 || others <= 0.0 {
-            return Vec::new();
-        }
-        let either = |slant: &f64| [*slant, -slant].map(|slant| line(slant * own / others));
-        SLANTS.iter().flat_map(either).collect()
+/// Lines along a pair to be tried for beliefs. Of probabilities only the sum and the difference say something.
+fn slants([feature, other]: Pair, collected: &Collected, members: &[u32]) -> Vec<Along> {
+    let line = |times: f64| Along {
+        feature,
+        plus: Some((rounded(times), other)),
+    };
+    if collected.is_probability(feature) {
+        return [1.0, -1.0].map(line).to_vec();
     }
+    let spread = |feature| collected.spread(feature, members);
+    let (own, others) = (spread(feature), spread(other));
+    if own <= 0.0 || others <= 0.0 {
+        return Vec::new();
+    }
+    let either = |slant: &f64| [*slant, -slant].map(|slant| line(slant * own / others));
+    SLANTS.iter().flat_map(either).collect()
 }
 
 impl Along {
@@ -66,9 +57,9 @@ impl Along {
                 .map(|(times, other)| (rounded(times * factor), other)),
             ..self
         };
-        match collected.features[self.feature] {
-            Feature::Mode(_) => Vec::new(),
-            _ => [factor, 1.0 / factor].map(turned).to_vec(),
+        match collected.is_probability(self.feature) {
+            true => Vec::new(),
+            false => [factor, 1.0 / factor].map(turned).to_vec(),
         }
     }
 
@@ -113,6 +104,15 @@ pub(super) struct Stakes<'a, C> {
     pub(super) cost: C,
     /// How much members count on either side, at least.
     pub(super) least: f64,
+}
+
+/// Members on whom lines are compared.
+struct Compared {
+    members: Vec<u32>,
+    /// Their numbers summed, and how much they count.
+    sums: (Vec<f64>, f64),
+    /// How much of them counts on either side, at least.
+    least: f64,
 }
 
 impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
@@ -160,14 +160,18 @@ impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
         let members = &self.members[0];
         let stride = members.len().div_ceil(COMPARED).max(1);
         let some: Vec<u32> = members.iter().copied().step_by(stride).collect();
-        let least = self.least / stride as f64;
+        let some = Compared {
+            least: self.least / stride as f64,
+            sums: self.sums(&some),
+            members: some,
+        };
         let pairs = self.collected.pairs.iter();
-        let slants = pairs.flat_map(|pair| pair.slants(self.collected, &some));
+        let slants = pairs.flat_map(|pair| slants(*pair, self.collected, &some.members));
         let slants = slants.chain(known.filter(|along| along.plus.is_some()));
-        let mut best = self.best_of(None, slants.collect(), &some, least)?;
+        let mut best = self.best_of(None, slants.collect(), &some)?;
         for factor in FINER {
             let turned = best.1.turned(self.collected, factor);
-            best = self.best_of(Some(best), turned, &some, least)?;
+            best = self.best_of(Some(best), turned, &some)?;
         }
         let along = best.1;
         let mut order: Vec<(f64, u32)> = members
@@ -184,10 +188,9 @@ impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
         &self,
         best: Option<(f64, Along)>,
         lines: Vec<Along>,
-        some: &[u32],
-        least: f64,
+        some: &Compared,
     ) -> Option<(f64, Along)> {
-        let costs = parallel::map(lines.len(), |i| self.roughly(lines[i], some, least));
+        let costs = parallel::map(lines.len(), |i| self.roughly(lines[i], some));
         costs.into_iter().zip(lines).fold(best, |best, next| {
             let better = best.is_none_or(|best| next.0 < best.0);
             if better { Some(next) } else { best }
@@ -195,14 +198,15 @@ impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
     }
 
     /// About what the best test along a line costs some of the members.
-    fn roughly(&self, along: Along, some: &[u32], least: f64) -> f64 {
+    fn roughly(&self, along: Along, some: &Compared) -> f64 {
         let collected = self.collected;
-        let values: Vec<f64> = some.iter().map(|m| along.of(collected, *m)).collect();
+        let members = &some.members;
+        let values: Vec<f64> = members.iter().map(|m| along.of(collected, *m)).collect();
         let (low, high) = range(&values);
         let per_unit = BINS as f64 / (high - low).max(f64::MIN_POSITIVE);
         let mut bins = vec![0.0; BINS * self.width];
         let mut counts = [0.0; BINS];
-        for (member, value) in some.iter().zip(&values) {
+        for (member, value) in members.iter().zip(&values) {
             let bin = (((value - low) * per_unit) as usize).min(BINS - 1);
             add(
                 &mut bins[bin * self.width..][..self.width],
@@ -210,21 +214,22 @@ impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
             );
             counts[bin] += collected.counts[*member as usize];
         }
-        let (all, counted) = self.sums(some);
+        let (all, counted) = &some.sums;
         let (mut below, mut count) = (vec![0.0; self.width], 0.0);
         let mut best = f64::INFINITY;
         for (row, more) in bins.chunks_exact(self.width).zip(counts) {
             add(&mut below, row);
             count += more;
-            if count >= least && counted - count >= least {
-                best = best.min((self.cost)(&below, &all));
+            if count >= some.least && counted - count >= some.least {
+                best = best.min((self.cost)(&below, all));
             }
         }
         best
     }
 }
 
-fn add(sums: &mut [f64], row: &[f64]) {
+/// Adds numbers to sums of them.
+pub(super) fn add(sums: &mut [f64], row: &[f64]) {
     sums.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
 }
 

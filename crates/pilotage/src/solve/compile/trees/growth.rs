@@ -4,7 +4,7 @@
 //! of use by itself. So growth looks two tests ahead, at coarse cuts; where exactly a test lies is found afterwards ([`super::shape`]).
 
 use super::collected::{Collected, Members};
-use super::cuts::{Along, Cut, Stakes};
+use super::cuts::{Along, Cut, Stakes, add};
 use super::shape::{Shape, cheapest};
 use crate::parallel;
 
@@ -183,6 +183,25 @@ impl<'a> Growth<'a> {
     }
 }
 
+/// The tree of at most so many leaves that costs least: each grown to so many, made better, and cut back.
+pub(super) fn cheapest_of(
+    growths: &mut [Growth<'_>; 2],
+    (collected, all): (&Collected, &Members),
+    grown: usize,
+    leaves: usize,
+) -> Shape {
+    let [straight, slanted] = growths.each_mut().map(|growth| {
+        let mut shape = growth.to(grown).clone();
+        shape.refine(collected, all);
+        shape.cut_back(collected, all, leaves);
+        shape
+    });
+    match slanted.cost(collected) < straight.cost(collected) {
+        true => slanted,
+        false => straight,
+    }
+}
+
 /// Where a feature is cut, so that about as many members lie in each bin.
 struct Bins {
     feature: usize,
@@ -235,13 +254,11 @@ impl Table {
                 second.bin(collected, *member),
             );
             let cell = &mut costs[i * row + j * actions..][..actions];
-            for (sum, cost) in cell.iter_mut().zip(collected.costs_of(*member)) {
-                *sum += cost;
-            }
+            add(cell, collected.costs_of(*member));
         }
         let mut all = vec![0.0; row];
         for of_row in costs.chunks_exact(row) {
-            all.iter_mut().zip(of_row).for_each(|(sum, x)| *sum += x);
+            add(&mut all, of_row);
         }
         Self {
             columns,
@@ -253,8 +270,7 @@ impl Table {
 
     fn add_row(&self, row: usize, sums: &mut [f64]) {
         let size = self.columns * self.actions;
-        let costs = &self.costs[row * size..][..size];
-        sums.iter_mut().zip(costs).for_each(|(sum, x)| *sum += x);
+        add(sums, &self.costs[row * size..][..size]);
     }
 }
 
@@ -262,13 +278,13 @@ impl Table {
 fn split_along(columns: &[f64], actions: usize) -> (f64, f64) {
     let mut all = vec![0.0; actions];
     for column in columns.chunks_exact(actions) {
-        all.iter_mut().zip(column).for_each(|(sum, x)| *sum += x);
+        add(&mut all, column);
     }
     let plain = least(all.iter().copied());
     let mut below = vec![0.0; actions];
     let mut best = plain;
     for column in columns.chunks_exact(actions) {
-        below.iter_mut().zip(column).for_each(|(sum, x)| *sum += x);
+        add(&mut below, column);
         let above = all.iter().zip(&below).map(|(all, below)| all - below);
         best = best.min(least(below.iter().copied()) + least(above));
     }

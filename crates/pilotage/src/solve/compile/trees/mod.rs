@@ -26,7 +26,7 @@ use crate::policy::{
 use crate::solve::deviation::{self, Budget};
 use crate::solve::rollout::{self, Judged};
 use collected::{Collected, Members};
-use growth::Growth;
+use growth::{Growth, cheapest_of};
 use shape::{Shape, Spot};
 
 /// How small a tree has to be.
@@ -231,8 +231,8 @@ impl Search<'_> {
                 seed,
             ));
             let all = collected.all();
-            let mut growth = Growth::straight_and_slanted(&collected, &all);
-            tree = Some(self.of_size((&collected, &all), &mut growth, self.imitated()));
+            let mut growths = Growth::straight_and_slanted(&collected, &all);
+            tree = Some(self.of_size((&collected, &all), &mut growths, self.imitated()));
         }
         self.try_sizes(&collected, trials);
     }
@@ -273,7 +273,7 @@ impl Search<'_> {
     /// Tries trees of many sizes, as far as larger ones earn more.
     fn try_sizes(&self, collected: &Collected, trials: &mut Trials) {
         let all = collected.all();
-        let mut growth = Growth::straight_and_slanted(collected, &all);
+        let mut growths = Growth::straight_and_slanted(collected, &all);
         let sizes = sizes(self.size.nodes);
         let mut left = sizes.as_slice();
         let first = trials.tried.len();
@@ -285,7 +285,7 @@ impl Search<'_> {
             left = later;
             let mut fresh: Vec<Option<Automaton>> = Vec::new();
             for &nodes in now {
-                let tree = self.of_size((collected, &all), &mut growth, nodes);
+                let tree = self.of_size((collected, &all), &mut growths, nodes);
                 let tried = trials.tried[first..].iter().map(|tried| &tried.tree);
                 let mut known = tried.chain(fresh.iter().flatten());
                 let is_known = known.any(|known| known.tree == tree.tree);
@@ -368,23 +368,14 @@ impl Search<'_> {
         self.seed.wrapping_add((IMITATING + IMPROVING) as u64)
     }
 
-    /// A tree of at most so many nodes: grown larger, made better, and cut back, whichever growth then costs less.
+    /// A tree of at most so many nodes, grown larger before it is cut back.
     fn of_size(
         &self,
         (collected, all): (&Collected, &Members),
-        growth: &mut [Growth<'_>; 2],
+        growths: &mut [Growth<'_>; 2],
         nodes: usize,
     ) -> Automaton {
-        let [straight, slanted] = growth.each_mut().map(|growth| {
-            let mut shape = growth.to(larger(nodes)).clone();
-            shape.refine(collected, all);
-            shape.cut_back(collected, all, nodes);
-            shape
-        });
-        let shape = match slanted.cost(collected) < straight.cost(collected) {
-            true => slanted,
-            false => straight,
-        };
+        let shape = cheapest_of(growths, (collected, all), larger(nodes), nodes);
         let mut tree = self.bare.clone();
         write(&shape, collected, &mut tree);
         tree

@@ -128,11 +128,9 @@ impl Shape {
             worse[*member as usize] = yes - no;
         }
         let below = |member: &&u32| cut.is_below(collected, **member);
-        let sum = |members: &mut dyn Iterator<Item = &u32>, of: fn(f64) -> f64| -> f64 {
-            members.map(|member| of(worse[*member as usize])).sum()
-        };
-        let now = sum(&mut members[0].iter().filter(below), |worse| worse);
-        let all = sum(&mut members[0].iter(), f64::abs);
+        let worse_at = |member: &u32| worse[*member as usize];
+        let now: f64 = members[0].iter().filter(below).map(worse_at).sum();
+        let all: f64 = members[0].iter().map(|member| worse_at(member).abs()).sum();
         let stakes = Stakes {
             collected,
             members,

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::collected::Collected;
 use super::cuts::Cut;
-use super::growth::Growth;
+use super::growth::{Growth, cheapest_of};
 use super::shape::{Shape, Spot};
 use crate::belief::{Belief, BeliefMdp};
 use crate::policy::{Automaton, Matching};
@@ -32,20 +32,11 @@ fn collected(beliefs: impl IntoIterator<Item = ([f64; 2], [f64; 2])>) -> Collect
     collected
 }
 
-/// The better of the trees of so many leaves, grown to so many.
+/// The tree of so many leaves, grown to so many.
 fn tree(collected: &Collected, grown: usize, leaves: usize) -> Shape {
     let all = collected.all();
-    let shapes = Growth::straight_and_slanted(collected, &all).map(|mut growth| {
-        let mut shape = growth.to(grown).clone();
-        shape.refine(collected, &all);
-        shape.cut_back(collected, &all, leaves);
-        shape
-    });
-    let better = |best: Shape, next: Shape| match next.cost(collected) < best.cost(collected) {
-        true => next,
-        false => best,
-    };
-    shapes.into_iter().reduce(better).unwrap()
+    let mut growths = Growth::straight_and_slanted(collected, &all);
+    cheapest_of(&mut growths, (collected, &all), grown, leaves)
 }
 
 fn cuts(shape: &Shape) -> Vec<Cut> {
