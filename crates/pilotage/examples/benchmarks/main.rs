@@ -1,0 +1,68 @@
+//! Makes docs/benchmarks.md: what plans promise and earn, on problems that others publish numbers for; or docs/gallery.md: the same of
+//! problems that people have; or docs/learners.md: what learners earn beside planners, on all built-in problems.
+//!
+//! ```sh
+//! cargo run --release -p pilotage --example benchmarks -- --out docs/benchmarks.md [PROBLEM ...]
+//! cargo run --release -p pilotage --example benchmarks -- --gallery target/gallery --out docs/gallery.md [PROBLEM ...]
+//! cargo run --release -p pilotage --example benchmarks -- --learners --out docs/learners.md [PROBLEM ...]
+//! ```
+//!
+//! The automata of the gallery are kept in the folder named; scripts/gallery.sh draws them too.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+mod gallery;
+mod learners;
+mod published;
+mod row;
+
+use std::error::Error;
+
+use row::Task;
+
+/// A page, or a part of one.
+type Page = Result<String, Box<dyn Error>>;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let Some(task) = value_of("--one", &mut arguments) {
+        let task: Task = serde_json::from_str(&task)?;
+        // Whoever asked for it wants the reason in words.
+        match task.measure() {
+            Ok(row) => println!("{}", serde_json::to_string(&row)?),
+            Err(error) => {
+                eprintln!("{error}");
+                std::process::exit(1);
+            }
+        }
+        return Ok(());
+    }
+    let out = value_of("--out", &mut arguments);
+    let folder = value_of("--gallery", &mut arguments);
+    let learners = arguments
+        .iter()
+        .position(|argument| argument == "--learners");
+    if let Some(place) = learners {
+        arguments.remove(place);
+    }
+    let asked = |name: &str| arguments.is_empty() || arguments.iter().any(|other| other == name);
+    let page = match (folder, learners) {
+        (Some(folder), _) => gallery::page(&folder, &asked)?,
+        (None, Some(_)) => learners::page(&asked)?,
+        (None, None) => published::page(&asked)?,
+    };
+    match out {
+        Some(path) => std::fs::write(path, page)?,
+        None => println!("{page}"),
+    }
+    Ok(())
+}
+
+/// Takes a flag and its value out of the arguments.
+fn value_of(flag: &str, arguments: &mut Vec<String>) -> Option<String> {
+    let place = arguments.iter().position(|argument| argument == flag)?;
+    if place + 1 >= arguments.len() {
+        return None;
+    }
+    arguments.remove(place);
+    Some(arguments.remove(place))
+}
