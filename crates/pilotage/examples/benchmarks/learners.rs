@@ -1,5 +1,8 @@
 //! docs/learners.md: what planners promise, what they earn, and what learners do that are told nothing.
 
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
 use pilotage::scenario;
 use pilotage::solve::Registry;
 use rayon::prelude::*;
@@ -20,46 +23,76 @@ const SHARE: f64 = 0.02;
 /// What became of a solver: what was measured, or why it refused.
 type Outcome = Result<Row, String>;
 
+/// By problem and solver; the planner is [`PLANNER`].
+type Outcomes = BTreeMap<String, BTreeMap<String, Outcome>>;
+
+/// Name of whichever planner is the first for a problem.
+const PLANNER: &str = "planner";
+
+/// What was measured so far.
+const KEPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/data/learners.json");
+
 /// A problem, and what became of the planner and of every learner.
-struct Line {
+struct Line<'a> {
     name: &'static str,
-    planner: Outcome,
-    learners: Vec<(&'static str, Outcome)>,
+    planner: Option<&'a Outcome>,
+    learners: Vec<(&'static str, Option<&'a Outcome>)>,
 }
 
-pub fn page(asked: &dyn Fn(&str) -> bool) -> Page {
+/// Measures the problems that are named, or what has not been measured yet, which can take hours; each outcome is kept at once.
+pub fn page(named: &[String]) -> Page {
     let registry = Registry::builtin();
     let learners = registry.entries().iter().filter(|entry| entry.learns());
     let learners: Vec<&'static str> = learners.map(|entry| entry.name()).collect();
-    let names: Vec<&'static str> = scenario::names().filter(|name| asked(name)).collect();
-    let solvers: Vec<Option<&'static str>> = std::iter::once(None)
-        .chain(learners.iter().copied().map(Some))
+    let outcomes: Outcomes = match std::fs::read_to_string(KEPT) {
+        Ok(text) => serde_json::from_str(&text)?,
+        Err(_) => Outcomes::new(),
+    };
+    let wanted = |name: &str, solver: &str| match named.is_empty() {
+        true => outcome(&outcomes, name, solver).is_none(),
+        false => named.iter().any(|other| other == name),
+    };
+    // Planners are quick, and of learners the first takes longest.
+    let solvers = [PLANNER].into_iter().chain(learners.iter().rev().copied());
+    let tasks: Vec<(&str, &str)> = solvers
+        .flat_map(|solver| scenario::names().map(move |name| (name, solver)))
+        .filter(|(name, solver)| wanted(name, solver))
         .collect();
-    let tasks: Vec<Task> = names
-        .iter()
-        .flat_map(|name| solvers.iter().map(move |solver| (name, solver)))
-        .map(|(name, solver)| Task {
+    let outcomes = Mutex::new(outcomes);
+    let measured = tasks.iter().par_bridge().map(|(name, solver)| {
+        let task = Task {
             problem: (*name).to_owned(),
-            solver: solver.map(str::to_owned),
+            solver: (*solver != PLANNER).then(|| (*solver).to_owned()),
             episodes: EPISODES,
             ..Task::default()
-        })
-        .collect();
-    let outcomes: Vec<Outcome> = tasks.par_iter().map(Task::measure_apart).collect();
-    let mut outcomes = outcomes.into_iter();
-    let mut outcome = || outcomes.next().unwrap_or_else(|| Err("lost".to_owned()));
-    let lines: Vec<Line> = names
-        .into_iter()
-        .map(|name| Line {
-            name,
-            planner: outcome(),
-            learners: learners
-                .iter()
-                .map(|learner| (*learner, outcome()))
-                .collect(),
-        })
-        .collect();
+        };
+        let found = task.measure_apart();
+        // Who refuses says why.
+        if found.as_ref().is_err_and(String::is_empty) {
+            return Err(format!("{name}, {solver}: stopped"));
+        }
+        let mut all = outcomes.lock().map_err(|error| error.to_string())?;
+        let of_problem = all.entry((*name).to_owned()).or_default();
+        of_problem.insert((*solver).to_owned(), found);
+        let text = serde_json::to_string_pretty(&*all).map_err(|error| error.to_string())?;
+        std::fs::write(KEPT, text + "\n").map_err(|error| error.to_string())
+    });
+    measured.collect::<Result<Vec<()>, String>>()?;
+    let outcomes = outcomes.into_inner()?;
+    let line = |name: &'static str| Line {
+        name,
+        planner: outcome(&outcomes, name, PLANNER),
+        learners: learners
+            .iter()
+            .map(|learner| (*learner, outcome(&outcomes, name, learner)))
+            .collect(),
+    };
+    let lines: Vec<Line> = scenario::names().map(line).collect();
     Ok(heading(&learners) + &table(&lines, &learners) + &verdicts(&lines))
+}
+
+fn outcome<'a>(outcomes: &'a Outcomes, name: &str, solver: &str) -> Option<&'a Outcome> {
+    outcomes.get(name)?.get(solver)
 }
 
 fn heading(learners: &[&str]) -> String {
@@ -67,7 +100,7 @@ fn heading(learners: &[&str]) -> String {
         "# Planners and learners\n\n\
          Every built-in problem, solved as `pilotage solve NAME` does by the first planner for it, and with `--with` {} by learners, which are told neither map nor rewards; of trees no return was to be lost by fewer nodes. *Planned* is what the \
          planner promises and *where it holds* what it earns where its model does, *earned* what is earned in the world of the problem: discounted returns, mean ± standard error over {EPISODES} episodes. Steps are those of experience, in thousands. \
-         Version {}, seed {SEED}; made by\n\n\
+         Version {}, seed {SEED}; made from [data/learners.json](data/learners.json), in which all was kept as it was measured, by\n\n\
          ```sh\ncargo run --release -p pilotage --example benchmarks -- --learners --out docs/learners.md\n```\n\n",
         learners
             .iter()
@@ -87,8 +120,8 @@ fn table(lines: &[Line], learners: &[&str]) -> String {
     text += &"--:|--:|--:|".repeat(learners.len());
     for line in lines {
         text += &format!("\n| `{}` |", line.name);
-        text += &match &line.planner {
-            Ok(row) => format!(
+        text += &match line.planner {
+            Some(Ok(row)) => format!(
                 " {} | {} | {} | {} | {} |",
                 row.solver,
                 nodes(row),
@@ -96,17 +129,17 @@ fn table(lines: &[Line], learners: &[&str]) -> String {
                 estimate(row.assumed, DIGITS),
                 estimate(row.earned, DIGITS)
             ),
-            Err(_) => " - | - | - | - | - |".to_owned(),
+            _ => " - | - | - | - | - |".to_owned(),
         };
         for (_, learner) in &line.learners {
             text += &match learner {
-                Ok(row) => format!(
+                Some(Ok(row)) => format!(
                     " {} | {} | {} |",
                     estimate(row.earned, DIGITS),
                     nodes(row),
                     or_none(row.samples, |steps| (steps / 1000).to_string())
                 ),
-                Err(_) => " - | - | - |".to_owned(),
+                _ => " - | - | - |".to_owned(),
             };
         }
     }
@@ -122,6 +155,7 @@ fn verdicts(lines: &[Line]) -> String {
     let promises: Vec<String> = lines.iter().filter_map(missed).collect();
     let beaten: Vec<String> = lines.iter().flat_map(beaten).collect();
     let refused: Vec<String> = lines.iter().flat_map(refused).collect();
+    let missing: Vec<String> = lines.iter().flat_map(missing).collect();
     let share = 100.0 * SHARE;
     section(
         &format!(
@@ -132,6 +166,7 @@ fn verdicts(lines: &[Line]) -> String {
         &format!("Learners that earn more than the planner by more than {ERRORS} standard errors"),
         &beaten,
     ) + &section("Refused", &refused)
+        + &section("Not measured yet", &missing)
 }
 
 fn section(heading: &str, points: &[String]) -> String {
@@ -144,7 +179,7 @@ fn section(heading: &str, points: &[String]) -> String {
 
 /// The promise, if it misses what is earned where it should hold, and what the output says of it.
 fn missed(line: &Line) -> Option<String> {
-    let row = line.planner.as_ref().ok()?;
+    let row = line.planner?.as_ref().ok()?;
     let (planned, (earned, stderr)) = (row.planned?, row.assumed);
     let allowed = ERRORS * stderr + SHARE * earned.abs();
     let misses = (planned - earned).abs() > allowed;
@@ -160,7 +195,7 @@ fn missed(line: &Line) -> Option<String> {
 
 /// The learners that earn more in the problem's world.
 fn beaten(line: &Line) -> Vec<String> {
-    let Ok(planner) = &line.planner else {
+    let Some(Ok(planner)) = line.planner else {
         return Vec::new();
     };
     let more = |learner: Pair| {
@@ -168,24 +203,34 @@ fn beaten(line: &Line) -> Vec<String> {
         let stderr = learner.1.hypot(planner.earned.1);
         (more > ERRORS * stderr).then_some((more, stderr))
     };
-    let said = |(name, outcome): &(&str, Outcome)| {
-        let more = more(outcome.as_ref().ok()?.earned)?;
-        Some(format!(
-            "`{}`: {name}, by {}.",
-            line.name,
-            estimate(more, DIGITS)
-        ))
+    let said = |(name, outcome): &(&str, Option<&Outcome>)| {
+        let more = more((*outcome)?.as_ref().ok()?.earned)?;
+        let world = match scenario::find(line.name).is_ok_and(|found| found.is_as_assumed()) {
+            true => "",
+            false => ", in a world that is not as the planner's model says",
+        };
+        let by = estimate(more, DIGITS);
+        Some(format!("`{}`: {name}, by {by}{world}.", line.name))
     };
     line.learners.iter().filter_map(said).collect()
 }
 
 fn refused(line: &Line) -> Vec<String> {
-    let outcomes = line.learners.iter().map(|(name, outcome)| (*name, outcome));
-    std::iter::once(("the planner", &line.planner))
-        .chain(outcomes)
-        .filter_map(|(name, outcome)| {
-            let error = outcome.as_ref().err()?;
-            Some(format!("`{}`, {name}: {error}", line.name))
-        })
+    let said = |(name, outcome): (&str, Option<&Outcome>)| {
+        let error = outcome?.as_ref().err()?;
+        Some(format!("`{}`, {name}: {error}.", line.name))
+    };
+    all(line).filter_map(said).collect()
+}
+
+fn missing(line: &Line) -> Vec<String> {
+    let not_yet = all(line).filter(|(_, outcome)| outcome.is_none());
+    not_yet
+        .map(|(name, _)| format!("`{}`, {name}.", line.name))
         .collect()
+}
+
+fn all<'a>(line: &Line<'a>) -> impl Iterator<Item = (&'static str, Option<&'a Outcome>)> {
+    let planner = std::iter::once((PLANNER, line.planner));
+    planner.chain(line.learners.clone())
 }

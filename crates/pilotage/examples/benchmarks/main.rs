@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let asked = |name: &str| arguments.is_empty() || arguments.iter().any(|other| other == name);
     let page = match (folder, learners) {
         (Some(folder), _) => gallery::page(&folder, &asked)?,
-        (None, Some(_)) => learners::page(&asked)?,
+        (None, Some(_)) => learners::page(&arguments)?,
         (None, None) => published::page(&asked)?,
     };
     match out {

@@ -106,10 +106,15 @@ pub(super) struct Stakes<'a, C> {
     pub(super) least: f64,
 }
 
-/// Members on whom lines are compared.
+/// Members on whom lines are compared, what is known of them side by side.
 struct Compared {
     members: Vec<u32>,
-    /// Their numbers summed, and how much they count.
+    /// By feature and member.
+    columns: Vec<Vec<f64>>,
+    /// By member, the numbers that are summed, and how much it counts.
+    rows: Vec<f64>,
+    counts: Vec<f64>,
+    /// These summed.
     sums: (Vec<f64>, f64),
     /// How much of them counts on either side, at least.
     least: f64,
@@ -155,16 +160,25 @@ impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
         best
     }
 
+    /// Every so many-th of the members.
+    fn compared(&self, stride: usize) -> Compared {
+        let members: Vec<u32> = self.members[0].iter().copied().step_by(stride).collect();
+        let of = |column: &Vec<f64>| members.iter().map(|m| column[*m as usize]).collect();
+        Compared {
+            columns: self.collected.columns.iter().map(of).collect(),
+            rows: members.iter().flat_map(|m| self.row(*m)).copied().collect(),
+            counts: of(&self.collected.counts),
+            sums: self.sums(&members),
+            least: self.least / stride as f64,
+            members,
+        }
+    }
+
     /// The best slanted test that is found, also near a line that is known, with what it costs.
     pub(super) fn slanted(&self, known: Option<Along>) -> Option<(f64, Cut)> {
         let members = &self.members[0];
         let stride = members.len().div_ceil(COMPARED).max(1);
-        let some: Vec<u32> = members.iter().copied().step_by(stride).collect();
-        let some = Compared {
-            least: self.least / stride as f64,
-            sums: self.sums(&some),
-            members: some,
-        };
+        let some = self.compared(stride);
         let pairs = self.collected.pairs.iter();
         let slants = pairs.flat_map(|pair| slants(*pair, self.collected, &some.members));
         let slants = slants.chain(known.filter(|along| along.plus.is_some()));
@@ -199,20 +213,23 @@ impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
 
     /// About what the best test along a line costs some of the members.
     fn roughly(&self, along: Along, some: &Compared) -> f64 {
-        let collected = self.collected;
-        let members = &some.members;
-        let values: Vec<f64> = members.iter().map(|m| along.of(collected, *m)).collect();
+        let own = &some.columns[along.feature];
+        let values: Vec<f64> = match along.plus {
+            None => own.clone(),
+            Some((times, other)) => {
+                let others = &some.columns[other];
+                own.iter().zip(others).map(|(x, y)| x + times * y).collect()
+            }
+        };
         let (low, high) = range(&values);
         let per_unit = BINS as f64 / (high - low).max(f64::MIN_POSITIVE);
         let mut bins = vec![0.0; BINS * self.width];
         let mut counts = [0.0; BINS];
-        for (member, value) in members.iter().zip(&values) {
+        let known = some.rows.chunks_exact(self.width).zip(&some.counts);
+        for (value, (row, count)) in values.iter().zip(known) {
             let bin = (((value - low) * per_unit) as usize).min(BINS - 1);
-            add(
-                &mut bins[bin * self.width..][..self.width],
-                self.row(*member),
-            );
-            counts[bin] += collected.counts[*member as usize];
+            add(&mut bins[bin * self.width..][..self.width], row);
+            counts[bin] += count;
         }
         let (all, counted) = &some.sums;
         let (mut below, mut count) = (vec![0.0; self.width], 0.0);

@@ -49,9 +49,10 @@ const KEPT: usize = 3;
 const GAIN: f64 = 2e-3;
 
 /// Beliefs judged in a round of imitation for each episode, and where these are cells about which the policy is asked in full, which takes
-/// far longer.
+/// far longer; and how many are enough in any case.
 const JUDGED: f64 = 20.0;
 const IN_FULL: f64 = 1.5;
+const ENOUGH: usize = 40_000;
 
 /// Beliefs in a round of improvement, and steps, for each episode.
 const DEVIATIONS: f64 = 10.0;
@@ -216,6 +217,7 @@ impl Search<'_> {
         let start = self.bare.updater.start();
         let in_full = start.cells().is_some() && self.policy.values_in_full(&start).is_some();
         let most = self.times(if in_full { IN_FULL } else { JUDGED });
+        let most = most.min(ENOUGH);
         let mut collected = Collected::new(self.space, &self.bare);
         let mut tree: Option<Automaton> = None;
         for round in 0..IMITATING {
@@ -239,8 +241,8 @@ impl Search<'_> {
 
     /// Nodes of a tree that collects beliefs for the next.
     fn imitated(&self) -> usize {
-        const ENOUGH: usize = 40;
-        self.size.nodes.min(ENOUGH)
+        const MANY: usize = 40;
+        self.size.nodes.min(MANY)
     }
 
     /// Trees grown on what the best so far earns if it once does something else, until none is better twice in a row.

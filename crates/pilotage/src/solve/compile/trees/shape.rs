@@ -131,6 +131,9 @@ impl Shape {
         let worse_at = |member: &u32| worse[*member as usize];
         let now: f64 = members[0].iter().filter(below).map(worse_at).sum();
         let all: f64 = members[0].iter().map(|member| worse_at(member).abs()).sum();
+        if all <= 0.0 {
+            return cut;
+        }
         let stakes = Stakes {
             collected,
             members,
