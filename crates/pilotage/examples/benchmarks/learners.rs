@@ -39,8 +39,9 @@ struct Line<'a> {
     learners: Vec<(&'static str, Option<&'a Outcome>)>,
 }
 
-/// Measures the problems that are named, or what has not been measured yet, which can take hours; each outcome is kept at once.
-pub fn page(named: &[String]) -> Page {
+/// Measures the problems that are named, or what has not been measured yet, which can take hours, unless the page is to be of what is
+/// `kept` alone; each outcome is kept at once.
+pub fn page(named: &[String], kept: bool) -> Page {
     let registry = Registry::builtin();
     let learners = registry.entries().iter().filter(|entry| entry.learns());
     let learners: Vec<&'static str> = learners.map(|entry| entry.name()).collect();
@@ -49,6 +50,7 @@ pub fn page(named: &[String]) -> Page {
         Err(_) => Outcomes::new(),
     };
     let wanted = |name: &str, solver: &str| match named.is_empty() {
+        _ if kept => false,
         true => outcome(&outcomes, name, solver).is_none(),
         false => named.iter().any(|other| other == name),
     };

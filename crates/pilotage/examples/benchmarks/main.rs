@@ -7,6 +7,9 @@
 //! cargo run --release -p pilotage --example benchmarks -- --learners --out docs/learners.md [PROBLEM ...]
 //! ```
 //!
+//! What learners earn is kept in docs/data/learners.json as it is measured, so that this may be stopped and gone on with; with `--kept` the
+//! page is made of that alone.
+//!
 //! The automata of the gallery are kept in the folder named; scripts/gallery.sh draws them too.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
@@ -38,23 +41,28 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let out = value_of("--out", &mut arguments);
     let folder = value_of("--gallery", &mut arguments);
-    let learners = arguments
-        .iter()
-        .position(|argument| argument == "--learners");
-    if let Some(place) = learners {
-        arguments.remove(place);
+    let [learners, kept] = ["--learners", "--kept"].map(|flag| is_given(flag, &mut arguments));
+    for name in &arguments {
+        pilotage::scenario::find(name)?;
     }
     let asked = |name: &str| arguments.is_empty() || arguments.iter().any(|other| other == name);
     let page = match (folder, learners) {
         (Some(folder), _) => gallery::page(&folder, &asked)?,
-        (None, Some(_)) => learners::page(&arguments)?,
-        (None, None) => published::page(&asked)?,
+        (None, true) => learners::page(&arguments, kept)?,
+        (None, false) => published::page(&asked)?,
     };
     match out {
         Some(path) => std::fs::write(path, page)?,
         None => println!("{page}"),
     }
     Ok(())
+}
+
+/// Takes a flag out of the arguments, if it is there.
+fn is_given(flag: &str, arguments: &mut Vec<String>) -> bool {
+    let before = arguments.len();
+    arguments.retain(|argument| argument != flag);
+    arguments.len() < before
 }
 
 /// Takes a flag and its value out of the arguments.
