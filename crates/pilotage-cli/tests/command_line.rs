@@ -235,13 +235,11 @@ fn what_cannot_be_done_is_one_message() {
     let cells = at("cells.json");
     printed(&[
         "solve",
-        "n-maze",
+        "light-dark-binary",
         "--set",
         "beliefs=2",
         "--set",
         "rounds=1",
-        "--set",
-        "bins=2",
         "--runs",
         "5",
         "--nodes",
@@ -350,7 +348,13 @@ fn what_cannot_be_done_is_one_message() {
             "start",
         ),
         (
-            &["simulate", "n-maze", "--policy", &cells, "--wake-up"],
+            &[
+                "simulate",
+                "light-dark-binary",
+                "--policy",
+                &cells,
+                "--wake-up",
+            ],
             "without --wake-up",
         ),
         (&["draw", &at("missing.json")], "missing.json"),
