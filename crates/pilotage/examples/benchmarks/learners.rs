@@ -1,6 +1,8 @@
 //! docs/learners.md: what planners promise, what they earn, and what learners do that are told nothing.
 
 use std::collections::BTreeMap;
+use std::error::Error;
+use std::io::ErrorKind;
 use std::sync::Mutex;
 
 use pilotage::scenario;
@@ -45,22 +47,53 @@ pub fn page(named: &[String], kept: bool) -> Page {
     let registry = Registry::builtin();
     let learners = registry.entries().iter().filter(|entry| entry.learns());
     let learners: Vec<&'static str> = learners.map(|entry| entry.name()).collect();
-    let outcomes: Outcomes = match std::fs::read_to_string(KEPT) {
-        Ok(text) => serde_json::from_str(&text)?,
-        Err(_) => Outcomes::new(),
+    let mut outcomes = known()?;
+    if !kept {
+        let tasks = tasks(named, &learners, &outcomes);
+        outcomes = measured(&tasks, outcomes)?;
+    }
+    let line = |name: &'static str| Line {
+        name,
+        planner: outcome(&outcomes, name, PLANNER),
+        learners: learners
+            .iter()
+            .map(|learner| (*learner, outcome(&outcomes, name, learner)))
+            .collect(),
     };
+    let lines: Vec<Line> = scenario::names().map(line).collect();
+    Ok(heading(&learners) + &table(&lines, &learners) + &verdicts(&lines))
+}
+
+/// What was measured before; nothing where there is no file yet.
+fn known() -> Result<Outcomes, Box<dyn Error>> {
+    match std::fs::read_to_string(KEPT) {
+        Ok(text) => Ok(serde_json::from_str(&text)?),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(Outcomes::new()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Problems with who is to solve them: those that are named, or all that are not known.
+fn tasks(
+    named: &[String],
+    learners: &[&'static str],
+    known: &Outcomes,
+) -> Vec<(&'static str, &'static str)> {
     let wanted = |name: &str, solver: &str| match named.is_empty() {
-        _ if kept => false,
-        true => outcome(&outcomes, name, solver).is_none(),
+        true => outcome(known, name, solver).is_none(),
         false => named.iter().any(|other| other == name),
     };
     // Planners are quick, and of learners the first takes longest.
     let solvers = [PLANNER].into_iter().chain(learners.iter().rev().copied());
-    let tasks: Vec<(&str, &str)> = solvers
+    solvers
         .flat_map(|solver| scenario::names().map(move |name| (name, solver)))
         .filter(|(name, solver)| wanted(name, solver))
-        .collect();
-    let outcomes = Mutex::new(outcomes);
+        .collect()
+}
+
+/// What is known, and what these tasks add to it; all is kept after each.
+fn measured(tasks: &[(&str, &str)], known: Outcomes) -> Result<Outcomes, Box<dyn Error>> {
+    let outcomes = Mutex::new(known);
     let measured = tasks.iter().par_bridge().map(|(name, solver)| {
         let task = Task {
             problem: (*name).to_owned(),
@@ -80,17 +113,7 @@ pub fn page(named: &[String], kept: bool) -> Page {
         std::fs::write(KEPT, text + "\n").map_err(|error| error.to_string())
     });
     measured.collect::<Result<Vec<()>, String>>()?;
-    let outcomes = outcomes.into_inner()?;
-    let line = |name: &'static str| Line {
-        name,
-        planner: outcome(&outcomes, name, PLANNER),
-        learners: learners
-            .iter()
-            .map(|learner| (*learner, outcome(&outcomes, name, learner)))
-            .collect(),
-    };
-    let lines: Vec<Line> = scenario::names().map(line).collect();
-    Ok(heading(&learners) + &table(&lines, &learners) + &verdicts(&lines))
+    Ok(outcomes.into_inner()?)
 }
 
 fn outcome<'a>(outcomes: &'a Outcomes, name: &str, solver: &str) -> Option<&'a Outcome> {

@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 
 use pilotage::progress::Silent;
 use pilotage::scenario;
@@ -58,16 +58,18 @@ pub struct Row {
 impl Task {
     /// Measures in a process of its own: this program with the task as its argument.
     pub fn measure_apart(&self) -> Result<Row, String> {
-        let said = |error: &dyn std::fmt::Display| error.to_string();
-        let task = serde_json::to_string(self).map_err(|error| said(&error))?;
-        eprintln!("{task}");
-        let program = std::env::current_exe().map_err(|error| said(&error))?;
-        let run = Command::new(program).args(["--one", &task]).output();
-        let run = run.map_err(|error| said(&error))?;
+        let run = self.run_apart().map_err(|error| error.to_string())?;
         if !run.status.success() {
             return Err(String::from_utf8_lossy(&run.stderr).trim().to_owned());
         }
-        serde_json::from_slice(&run.stdout).map_err(|error| said(&error))
+        serde_json::from_slice(&run.stdout).map_err(|error| error.to_string())
+    }
+
+    fn run_apart(&self) -> Result<Output, Box<dyn Error>> {
+        let task = serde_json::to_string(self)?;
+        eprintln!("{task}");
+        let program = std::env::current_exe()?;
+        Ok(Command::new(program).args(["--one", &task]).output()?)
     }
 
     /// Solves the problem, and runs what is found. No return may be lost by fewer nodes.

@@ -73,7 +73,12 @@ impl Along {
 
     /// What a belief answers.
     pub(super) fn of(self, collected: &Collected, member: u32) -> f64 {
-        let value = |feature: usize| collected.columns[feature][member as usize];
+        self.at(&collected.columns, member as usize)
+    }
+
+    /// What is answered where the features, in a column each, are at a place.
+    fn at(self, columns: &[Vec<f64>], place: usize) -> f64 {
+        let value = |feature: usize| columns[feature][place];
         match self.plus {
             None => value(self.feature),
             Some((times, other)) => value(self.feature) + times * value(other),
@@ -176,6 +181,9 @@ impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
 
     /// The best slanted test that is found, also near a line that is known, with what it costs.
     pub(super) fn slanted(&self, known: Option<Along>) -> Option<(f64, Cut)> {
+        if self.collected.pairs.is_empty() {
+            return None;
+        }
         let members = &self.members[0];
         let stride = members.len().div_ceil(COMPARED).max(1);
         let some = self.compared(stride);
@@ -213,14 +221,8 @@ impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
 
     /// About what the best test along a line costs some of the members.
     fn roughly(&self, along: Along, some: &Compared) -> f64 {
-        let own = &some.columns[along.feature];
-        let values: Vec<f64> = match along.plus {
-            None => own.clone(),
-            Some((times, other)) => {
-                let others = &some.columns[other];
-                own.iter().zip(others).map(|(x, y)| x + times * y).collect()
-            }
-        };
+        let places = 0..some.members.len();
+        let values: Vec<f64> = places.map(|i| along.at(&some.columns, i)).collect();
         let (low, high) = range(&values);
         let per_unit = BINS as f64 / (high - low).max(f64::MIN_POSITIVE);
         let mut bins = vec![0.0; BINS * self.width];

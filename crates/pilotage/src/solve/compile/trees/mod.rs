@@ -216,8 +216,8 @@ impl Search<'_> {
         let length = self.space.model().episode.length;
         let start = self.bare.updater.start();
         let in_full = start.cells().is_some() && self.policy.values_in_full(&start).is_some();
-        let most = self.times(if in_full { IN_FULL } else { JUDGED });
-        let most = most.min(ENOUGH);
+        let each = if in_full { IN_FULL } else { JUDGED };
+        let most = self.times(each).min(ENOUGH);
         let mut collected = Collected::new(self.space, &self.bare);
         let mut tree: Option<Automaton> = None;
         for round in 0..IMITATING {
