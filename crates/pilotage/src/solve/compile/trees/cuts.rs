@@ -11,7 +11,7 @@ pub(super) struct Along {
 }
 
 /// A test.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Cut {
     pub(super) along: Along,
     pub(super) less_than: f64,
@@ -23,8 +23,7 @@ const SLANTS: [f64; 7] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// By so much are the best of them changed, either way, one change after the other.
 const FINER: [f64; 5] = [1.414, 1.19, 1.09, 1.04, 1.02];
 
-/// Beliefs on which slants are first tried, those on which the best are compared, and bins along each of them.
-const TRIED: usize = 1_000;
+/// Beliefs that slants are compared on, and bins along each of them.
 const COMPARED: usize = 4_000;
 const BINS: usize = 200;
 
@@ -126,15 +125,6 @@ struct Compared {
     least: f64,
 }
 
-/// About where a test along a line costs some of the members least: at the edge of a bin so wide.
-#[derive(Clone, Copy)]
-struct Rough {
-    cost: f64,
-    along: Along,
-    edge: f64,
-    bin: f64,
-}
-
 impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
     fn row(&self, member: u32) -> &[f64] {
         &self.rows[member as usize * self.width..][..self.width]
@@ -151,41 +141,26 @@ impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
 
     /// The best test of a feature by itself, with what it costs.
     pub(super) fn straight(&self, feature: usize) -> Option<(f64, Cut)> {
-        let order = &self.members[feature];
-        let values = order
-            .iter()
-            .map(|&member| (self.collected.columns[feature][member as usize], member));
-        self.swept(
-            Along::feature(feature),
-            (vec![0.0; self.width], 0.0),
-            values,
-            &self.sums(order),
-        )
+        self.swept(Along::feature(feature), &self.members[feature])
     }
 
-    /// The best test along a line among members that are on it in this order, with those before them summed, and all.
-    fn swept(
-        &self,
-        along: Along,
-        (mut below, mut count): (Vec<f64>, f64),
-        order: impl IntoIterator<Item = (f64, u32)>,
-        (all, counted): &(Vec<f64>, f64),
-    ) -> Option<(f64, Cut)> {
+    /// The best test along a line, on which members are in this order.
+    fn swept(&self, along: Along, order: &[u32]) -> Option<(f64, Cut)> {
+        let (all, counted) = self.sums(order);
+        let (mut below, mut count) = (vec![0.0; self.width], 0.0);
         let mut best: Option<(f64, Cut)> = None;
-        let mut last: Option<f64> = None;
-        for (here, member) in order {
-            let between = last.filter(|last| *last < here);
-            let is_enough = count >= self.least && counted - count >= self.least;
-            if let Some(last) = between.filter(|_| is_enough) {
-                let cost = (self.cost)(&below, all);
-                if best.is_none_or(|(least, _)| cost < least) {
-                    let less_than = 0.5 * (last + here);
-                    best = Some((cost, Cut { along, less_than }));
-                }
+        for pair in order.windows(2) {
+            add(&mut below, self.row(pair[0]));
+            count += self.collected.counts[pair[0] as usize];
+            let [here, next] = [pair[0], pair[1]].map(|member| along.of(self.collected, member));
+            if here >= next || count < self.least || counted - count < self.least {
+                continue;
             }
-            add(&mut below, self.row(member));
-            count += self.collected.counts[member as usize];
-            last = Some(here);
+            let cost = (self.cost)(&below, &all);
+            if best.is_none_or(|(least, _)| cost < least) {
+                let less_than = 0.5 * (here + next);
+                best = Some((cost, Cut { along, less_than }));
+            }
         }
         best
     }
@@ -204,90 +179,68 @@ impl<C: Fn(&[f64], &[f64]) -> f64 + Sync> Stakes<'_, C> {
         }
     }
 
-    /// The best slanted test that is found, also near a line that is known, with what it costs; none where that seems to be no less than so
-    /// much.
-    pub(super) fn slanted(&self, known: Option<Along>, less_than: f64) -> Option<(f64, Cut)> {
+    /// The best slanted test that is found, also near a line that is known, with what it costs.
+    pub(super) fn slanted(&self, known: Option<Along>) -> Option<(f64, Cut)> {
         if self.collected.pairs.is_empty() {
             return None;
         }
-        let stride = |most: usize| self.members[0].len().div_ceil(most).max(1);
-        let few = self.compared(stride(TRIED));
-        let pairs = self.collected.pairs.iter();
-        let slants = pairs.flat_map(|pair| slants(*pair, self.collected, &few.members));
-        let first = self.best_of(None, slants.collect(), &few);
-        let stride = stride(COMPARED);
+        let members = &self.members[0];
+        let stride = members.len().div_ceil(COMPARED).max(1);
         let some = self.compared(stride);
-        let first = first.map(|rough| rough.along);
-        let known = known.filter(|along| along.plus.is_some());
-        let mut best = self.best_of(None, first.into_iter().chain(known).collect(), &some)?;
+        let pairs = self.collected.pairs.iter();
+        let slants = pairs.flat_map(|pair| slants(*pair, self.collected, &some.members));
+        let slants = slants.chain(known.filter(|along| along.plus.is_some()));
+        let mut best = self.best_of(None, slants.collect(), &some)?;
         for factor in FINER {
-            let turned = best.along.turned(self.collected, factor);
+            let turned = best.1.turned(self.collected, factor);
             best = self.best_of(Some(best), turned, &some)?;
         }
-        match stride as f64 * best.cost < less_than {
-            true => self.placed(best),
-            false => None,
-        }
-    }
-
-    /// The best test along a line near where it was found to cost least.
-    fn placed(&self, rough: Rough) -> Option<(f64, Cut)> {
-        let all = self.sums(&self.members[0]);
-        let (mut below, mut count) = (vec![0.0; self.width], 0.0);
-        let mut near: Vec<(f64, u32)> = Vec::new();
-        for &member in &self.members[0] {
-            let value = rough.along.of(self.collected, member);
-            if value < rough.edge - rough.bin {
-                add(&mut below, self.row(member));
-                count += self.collected.counts[member as usize];
-            } else if value <= rough.edge + rough.bin {
-                near.push((value, member));
-            }
-        }
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        self.swept(rough.along, (below, count), near, &all)
+        let along = best.1;
+        let mut order: Vec<(f64, u32)> = members
+            .iter()
+            .map(|&member| (along.of(self.collected, member), member))
+            .collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let order: Vec<u32> = order.into_iter().map(|(_, member)| member).collect();
+        self.swept(along, &order)
     }
 
     /// The line along which a test costs least for some of the members, the best so far unless another is better.
-    fn best_of(&self, best: Option<Rough>, lines: Vec<Along>, some: &Compared) -> Option<Rough> {
-        let found = parallel::map(lines.len(), |i| self.roughly(lines[i], some));
-        found.into_iter().fold(best, |best, next| {
-            let better = best.is_none_or(|best| next.cost < best.cost);
+    fn best_of(
+        &self,
+        best: Option<(f64, Along)>,
+        lines: Vec<Along>,
+        some: &Compared,
+    ) -> Option<(f64, Along)> {
+        let costs = parallel::map(lines.len(), |i| self.roughly(lines[i], some));
+        costs.into_iter().zip(lines).fold(best, |best, next| {
+            let better = best.is_none_or(|best| next.0 < best.0);
             if better { Some(next) } else { best }
         })
     }
 
-    /// About where the best test along a line is, and what it costs some of the members.
-    fn roughly(&self, along: Along, some: &Compared) -> Rough {
+    /// About what the best test along a line costs some of the members.
+    fn roughly(&self, along: Along, some: &Compared) -> f64 {
         let places = 0..some.members.len();
         let values: Vec<f64> = places.map(|i| along.at(&some.columns, i)).collect();
         let (low, high) = range(&values);
-        let bin = ((high - low) / BINS as f64).max(f64::MIN_POSITIVE);
+        let per_unit = BINS as f64 / (high - low).max(f64::MIN_POSITIVE);
         let mut bins = vec![0.0; BINS * self.width];
         let mut counts = [0.0; BINS];
         let known = some.rows.chunks_exact(self.width).zip(&some.counts);
         for (value, (row, count)) in values.iter().zip(known) {
-            let bin = (((value - low) / bin) as usize).min(BINS - 1);
+            let bin = (((value - low) * per_unit) as usize).min(BINS - 1);
             add(&mut bins[bin * self.width..][..self.width], row);
             counts[bin] += count;
         }
         let (all, counted) = &some.sums;
         let (mut below, mut count) = (vec![0.0; self.width], 0.0);
-        let mut best = Rough {
-            cost: f64::INFINITY,
-            along,
-            edge: low,
-            bin,
-        };
-        for (i, (row, more)) in bins.chunks_exact(self.width).zip(counts).enumerate() {
+        let mut best = f64::INFINITY;
+        for (row, more) in bins.chunks_exact(self.width).zip(counts) {
             add(&mut below, row);
             count += more;
             if count >= some.least && counted - count >= some.least {
-                let cost = (self.cost)(&below, all);
-                if cost < best.cost {
-                    let edge = low + (i + 1) as f64 * bin;
-                    best = Rough { cost, edge, ..best };
-                }
+                best = best.min((self.cost)(&below, all));
             }
         }
         best

@@ -118,33 +118,4 @@ proptest! {
             prop_assert_eq!(members, collected.beliefs.len());
         }
     }
-
-    /// Only tests about which something changed are looked at again, and that is as good as looking at all.
-    #[test]
-    fn what_is_settled_need_not_be_looked_at(
-        beliefs in prop::collection::vec(
-            ((-1.0f64..1.0, -1.0f64..1.0), (0.0f64..1.0, 0.0f64..1.0)), 1..120),
-        leaves in 1usize..5,
-    ) {
-        let beliefs = beliefs.into_iter().map(|((x, y), (a, b))| ([x, y], [a, b]));
-        let collected = collected(beliefs);
-        let all = collected.all();
-        for mut growth in Growth::straight_and_slanted(&collected, &all) {
-            let mut kept = growth.to(leaves + 6).clone();
-            let mut anew = kept.clone();
-            loop {
-                for _ in 0..2 {
-                    kept.pass(&collected, &all);
-                    anew.unsettle_below(0);
-                    anew.pass(&collected, &all);
-                    prop_assert_eq!(kept.cost(&collected), anew.cost(&collected));
-                }
-                let cut = kept.cut(&collected, &all, leaves);
-                prop_assert_eq!(cut, anew.cut(&collected, &all, leaves));
-                if !cut {
-                    break;
-                }
-            }
-        }
-    }
 }
