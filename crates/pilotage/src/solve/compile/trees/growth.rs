@@ -116,20 +116,27 @@ impl<'a> Growth<'a> {
             .into_iter()
             .flatten()
             .map(|(left, cut)| (cut, cost - left));
-        let slanted = self.slanted.then(|| stakes.slanted(None)).flatten();
-        let slanted = slanted.map(|(left, cut)| (cut, (cost - left) / SLANTED));
         let bins: Vec<Bins> = (0..features)
             .map(|feature| Bins::new(self.collected, feature, &members[feature]))
             .collect();
         let two = parallel::map(features, |feature| self.two(feature, &bins, first, &sums));
-        let all = straight.chain(two.into_iter().flatten()).chain(slanted);
-        all.filter(|(_, saved)| *saved > NOTHING * cost).fold(
+        let straight = straight.chain(two.into_iter().flatten());
+        let best = straight.filter(|(_, saved)| *saved > NOTHING * cost).fold(
             None,
             |best: Option<(Cut, f64)>, next| match best {
                 Some(best) if best.1 >= next.1 => Some(best),
                 _ => Some(next),
             },
-        )
+        );
+        if !self.slanted {
+            return best;
+        }
+        let enough = SLANTED * best.map_or(NOTHING * cost, |(_, saved)| saved);
+        let slanted = stakes.slanted(None, cost - enough);
+        let slanted = slanted.map(|(left, cut)| (cut, (cost - left) / SLANTED));
+        slanted
+            .filter(|(_, saved)| SLANTED * saved > enough)
+            .or(best)
     }
 
     /// The test of a feature that saves most for each leaf together with one more on either side, or on both.

@@ -52,7 +52,7 @@ const GAIN: f64 = 2e-3;
 /// far longer; and how many are enough in any case.
 const JUDGED: f64 = 20.0;
 const IN_FULL: f64 = 1.5;
-const ENOUGH: usize = 40_000;
+const ENOUGH: usize = 10_000;
 
 /// Beliefs in a round of improvement, and steps, for each episode.
 const DEVIATIONS: f64 = 10.0;

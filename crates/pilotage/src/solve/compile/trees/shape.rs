@@ -31,12 +31,15 @@ pub(super) enum Spot {
 #[derive(Debug, Clone)]
 pub(super) struct Shape {
     pub(super) spots: Vec<Spot>,
+    /// Spots at and below which all is where it costs least, each test with the others as they are.
+    settled: Vec<bool>,
 }
 
 impl Shape {
     pub(super) fn leaf(action: ActionId) -> Self {
         Self {
             spots: vec![Spot::Leaf(action)],
+            settled: vec![false],
         }
     }
 
@@ -45,7 +48,28 @@ impl Shape {
         let ends = [self.spots.len(), self.spots.len() + 1];
         self.spots.extend(actions.map(Spot::Leaf));
         self.spots[spot] = Spot::Test(cut, ends);
+        self.settled.extend([false; 2]);
+        self.unsettle_above(0, spot);
         ends
+    }
+
+    /// What lies below a spot may no longer be where it costs least, other beliefs coming there.
+    pub(super) fn unsettle_below(&mut self, spot: usize) {
+        self.settled[spot] = false;
+        if let Spot::Test(_, ends) = self.spots[spot] {
+            ends.into_iter().for_each(|end| self.unsettle_below(end));
+        }
+    }
+
+    /// Neither may what leads from one spot to another, since it costs something else to go there.
+    fn unsettle_above(&mut self, from: usize, spot: usize) -> bool {
+        let leads = from == spot
+            || match self.spots[from] {
+                Spot::Leaf(_) => false,
+                Spot::Test(_, ends) => ends.into_iter().any(|end| self.unsettle_above(end, spot)),
+            };
+        self.settled[from] &= !leads;
+        leads
     }
 
     /// Leaves below a spot.
@@ -83,10 +107,9 @@ impl Shape {
 
     /// Puts tests and actions where they cost least, one after the other, until little is saved.
     pub(super) fn refine(&mut self, collected: &Collected, all: &Members) {
-        let least = LEAST * collected.counted(&all[0]);
         let mut cost = self.cost(collected);
         for _ in 0..PASSES {
-            self.refine_below(collected, 0, all.clone(), least);
+            self.pass(collected, all);
             let now = self.cost(collected);
             if cost - now <= LITTLE * cost {
                 break;
@@ -95,23 +118,43 @@ impl Shape {
         }
     }
 
-    fn refine_below(&mut self, collected: &Collected, spot: usize, members: Members, least: f64) {
-        if members[0].is_empty() {
-            return;
+    /// Puts every test and action once where it costs least.
+    pub(super) fn pass(&mut self, collected: &Collected, all: &Members) {
+        let least = LEAST * collected.counted(&all[0]);
+        if !self.settled[0] {
+            self.settle(collected, 0, all.clone(), least);
         }
-        match self.spots[spot] {
-            Spot::Leaf(_) => {
-                self.spots[spot] = Spot::Leaf(cheapest(&collected.sums(&members[0])));
+    }
+
+    /// Puts tests and actions at and below a spot where they cost least, and says whether any was elsewhere.
+    fn settle(&mut self, collected: &Collected, spot: usize, members: Members, least: f64) -> bool {
+        if members[0].is_empty() || self.settled[spot] {
+            return false;
+        }
+        let is_other = match self.spots[spot] {
+            Spot::Leaf(action) => {
+                let best = cheapest(&collected.sums(&members[0]));
+                self.spots[spot] = Spot::Leaf(best);
+                best != action
             }
             Spot::Test(cut, ends) => {
-                let cut = self.moved(collected, (cut, ends), &members, least);
-                self.spots[spot] = Spot::Test(cut, ends);
-                let parts = collected.parted(members, cut);
-                for (end, members) in ends.into_iter().zip(parts) {
-                    self.refine_below(collected, end, members, least);
+                let best = self.moved(collected, (cut, ends), &members, least);
+                if best != cut {
+                    self.spots[spot] = Spot::Test(best, ends);
+                    self.unsettle_below(spot);
                 }
+                let parts = collected.parted(members, best);
+                let below = ends
+                    .into_iter()
+                    .zip(parts)
+                    .fold(false, |below, (end, members)| {
+                        self.settle(collected, end, members, least) | below
+                    });
+                best != cut || below
             }
-        }
+        };
+        self.settled[spot] = !is_other;
+        is_other
     }
 
     /// The best test with what lies below it as it is: the old one, unless another saves something.
@@ -149,55 +192,55 @@ impl Shape {
                 best = found;
             }
         }
-        if let Some((sum, slanted)) = stakes.slanted(Some(cut.along)) {
-            let price = if cut.is_slanted() { 0.0 } else { SLANTED * all };
-            if sum < best.0 - price {
-                return slanted;
-            }
+        let price = if cut.is_slanted() { 0.0 } else { SLANTED * all };
+        match stakes.slanted(Some(cut.along), best.0 - price) {
+            Some((sum, slanted)) if sum < best.0 - price => slanted,
+            _ => best.1,
         }
-        best.1
     }
 
-    /// Takes away tests, each time the one of which a leaf less costs least, until no more leaves than so many are left, and those that
-    /// save nothing.
+    /// Takes away tests until no more leaves than so many are left, and those that save nothing; what is left is put where it costs least.
     pub(super) fn cut_back(&mut self, collected: &Collected, all: &Members, leaves: usize) {
-        loop {
-            let now = self.leaves(0);
-            let mut best: Option<(f64, usize, usize)> = None;
-            self.weigh(collected, 0, &all[0], &mut |ratio, spot, end| {
-                if best.is_none_or(|(least, _, _)| ratio < least) {
-                    best = Some((ratio, spot, end));
-                }
-            });
-            let Some((ratio, spot, end)) = best else {
-                return;
-            };
-            if now <= leaves && ratio > 0.0 {
-                return;
-            }
-            self.spots[spot] = self.spots[end];
+        while self.cut(collected, all, leaves) {
             self.refine(collected, all);
         }
     }
 
-    /// Tells of every test what each leaf less would cost if all went on at one of its ends.
+    /// Takes away the test of which a leaf less costs least, if there are more leaves than so many, or it saves nothing.
+    pub(super) fn cut(&mut self, collected: &Collected, all: &Members, leaves: usize) -> bool {
+        let mut best: Option<(f64, usize, usize)> = None;
+        let costs = |&member: &u32| (member, self.cost_of(collected, 0, member));
+        let all: Vec<(u32, f64)> = all[0].iter().map(costs).collect();
+        self.weigh(collected, 0, &all, &mut |ratio, spot, end| {
+            if best.is_none_or(|(least, _, _)| ratio < least) {
+                best = Some((ratio, spot, end));
+            }
+        });
+        let gone = best.filter(|(ratio, _, _)| self.leaves(0) > leaves || *ratio <= 0.0);
+        if let Some((_, spot, end)) = gone {
+            self.spots[spot] = self.spots[end];
+            self.unsettle_above(0, spot);
+            self.unsettle_below(spot);
+        }
+        gone.is_some()
+    }
+
+    /// Tells of every test what each leaf less would cost if all went on at one of its ends; of beliefs it is known what they cost now.
     fn weigh(
         &self,
         collected: &Collected,
         spot: usize,
-        members: &[u32],
+        members: &[(u32, f64)],
         tell: &mut dyn FnMut(f64, usize, usize),
     ) {
         let Spot::Test(cut, ends) = self.spots[spot] else {
             return;
         };
-        let (yes, no): (Vec<u32>, Vec<u32>) = members
+        let (yes, no): (Vec<_>, Vec<_>) = members
             .iter()
-            .partition(|member| cut.is_below(collected, **member));
+            .partition(|(member, _)| cut.is_below(collected, *member));
         for (gone, kept, stray) in [(ends[1], ends[0], &no), (ends[0], ends[1], &yes)] {
-            let more = |member: &u32| {
-                self.cost_of(collected, kept, *member) - self.cost_of(collected, gone, *member)
-            };
+            let more = |&(member, now): &(u32, f64)| self.cost_of(collected, kept, member) - now;
             let more: f64 = stray.iter().map(more).sum();
             tell(more / self.leaves(gone) as f64, spot, kept);
         }
