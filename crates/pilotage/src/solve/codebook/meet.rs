@@ -15,7 +15,18 @@ pub(in crate::solve) struct Met<F> {
     pub moments: Moments,
 }
 
-/// Share of actions that are taken at random when a policy is followed.
+/// How beliefs are met.
+#[derive(Clone, Copy)]
+pub(in crate::solve) enum Walk<'a> {
+    /// By taking any action for a while and then another.
+    Blind,
+    /// The same, but none by which the episode is most likely over: it leads to no belief.
+    Wary,
+    /// By following a plan that now and then gives way to a wary walk.
+    Following(&'a GridValues),
+}
+
+/// Share of actions that are taken at random when a plan is followed.
 const SLIPS: f64 = 0.15;
 
 /// Chance that a random walk changes its action.
@@ -24,12 +35,11 @@ const TURNS: f64 = 0.2;
 /// Most beliefs that are kept of one episode.
 const MOST: usize = 100;
 
-/// Runs so many episodes and returns the beliefs met at their decisions: those of a policy that slips now and then, or of walks that take
-/// an action for a while and then another. The same for any number of threads.
+/// Runs so many episodes and returns the beliefs met at their decisions. The same for any number of threads.
 pub(in crate::solve) fn meet<K: Keeping>(
     model: &Model,
     keeping: &K,
-    policy: Option<&GridValues>,
+    walk: Walk<'_>,
     episodes: usize,
     seed: u64,
 ) -> Vec<Met<K::Full>> {
@@ -40,22 +50,22 @@ pub(in crate::solve) fn meet<K: Keeping>(
         let mut whims = stream(seed, episode as u64, Role::Exploration);
         let mut observation = Observation::new(model.observation_dim());
         let mut met = Vec::new();
-        let mut action = any(model, &mut whims);
         let mut full = keeping.start();
         world.reset(&mut draws);
         let mut step = 0;
+        let mut action = walk.any(keeping, (&full, step), &mut whims);
         for _ in 0..model.episode.length.min(MOST) {
             let mut moments = Moments {
                 step,
                 ..Moments::default()
             };
             keeping.moments(&full, &mut moments);
-            action = match policy {
-                Some(policy) if uniform(&mut whims) >= SLIPS => {
-                    first_best(&policy.values_between(&moments))
+            action = match walk {
+                Walk::Following(plan) if uniform(&mut whims) >= SLIPS => {
+                    first_best(&plan.values_between(&moments))
                 }
-                None if uniform(&mut whims) >= TURNS => action,
-                _ => any(model, &mut whims),
+                Walk::Blind | Walk::Wary if uniform(&mut whims) >= TURNS => action,
+                _ => walk.any(keeping, (&full, step), &mut whims),
             };
             met.push(Met {
                 full: full.clone(),
@@ -77,7 +87,27 @@ pub(in crate::solve) fn meet<K: Keeping>(
     runs.into_iter().flatten().collect()
 }
 
-fn any(model: &Model, whims: &mut Rng) -> usize {
-    let actions = model.actions.len();
-    ((uniform(whims) * actions as f64) as usize).min(actions - 1)
+impl Walk<'_> {
+    /// An action at random.
+    fn any<K: Keeping>(
+        self,
+        keeping: &K,
+        (full, step): (&K::Full, usize),
+        whims: &mut Rng,
+    ) -> usize {
+        let goes_on = |action: &usize| match self {
+            Self::Blind => true,
+            Self::Wary | Self::Following(_) => {
+                keeping.act(&mut full.clone(), *action, step).ended < 0.5
+            }
+        };
+        let actions: Vec<usize> = (0..keeping.actions()).filter(goes_on).collect();
+        // Where all of them end it, it is any.
+        let count = match actions.len() {
+            0 => keeping.actions(),
+            count => count,
+        };
+        let drawn = ((uniform(whims) * count as f64) as usize).min(count - 1);
+        actions.get(drawn).copied().unwrap_or(drawn)
+    }
 }

@@ -3,7 +3,7 @@
 //! Beliefs are kept in full, by whatever [`Keeping`] a model takes, and read as a mean and one of finitely many strata
 //! ([`Codebook`]). Values stand on a grid of means for every stratum.
 //!
-//! 1. Beliefs are met by acting at random, and strata chosen among them so that all are near one.
+//! 1. Beliefs are met by acting at random, though not so that the episode is over, and strata chosen among them so that all are near one.
 //! 2. From every stratum and mean of the grid every action leads to the beliefs after evenly spread readings, which are read as the strata
 //!    that they lie between and the points of the grid around their mean. Where beliefs in full were met, they take the place of what
 //!    the codebook makes of them. Once there is a plan, only those are looked at that beliefs were met near: of the others it is kept.
@@ -37,7 +37,7 @@ use crate::simulate::{Options, evaluate};
 pub use grid_values::GridValues;
 use means::Means;
 use meet::Met;
-pub(super) use meet::meet;
+pub(super) use meet::{Walk, meet};
 use rows::Rows;
 
 /// Name of the solver in errors and policies.
@@ -46,7 +46,7 @@ const SOLVER: &str = "codebook";
 /// The planner on a codebook of strata.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CodebookPlanner {
-    /// Most strata; at least 1, at most 1000, or `auto` for 120 where a step of a belief takes little time and 40 elsewhere.
+    /// Most strata; at least 1, at most 1000, or `auto` for 120 where a step of a belief takes little time and 60 elsewhere.
     pub strata: Option<usize>,
     /// How far apart strata are at least, in units of the logarithm of a standard deviation; more than 0.
     pub apart: f64,
@@ -73,7 +73,7 @@ impl Default for CodebookPlanner {
             apart: 0.12,
             points: None,
             readings: None,
-            rounds: 3,
+            rounds: 4,
             episodes: 200,
             refined: None,
             tolerance: 1e-6,
@@ -148,9 +148,10 @@ struct Size {
 }
 
 impl Size {
-    /// Most strata of a round: three quarters of all in the first, so that later ones find room for strata of what they have met.
+    /// Most strata of a round: half of all in the first, which knows only what is met by chance, so that later ones find room for strata of
+    /// what they have met.
     fn strata_of(self, round: usize) -> usize {
-        let later = self.strata / 4;
+        let later = self.strata / 2;
         match self.rounds {
             1 => self.strata,
             rounds => self.strata - later + (later * round).div_ceil(rounds - 1),
@@ -203,7 +204,7 @@ impl<'a, K: Keeping> Course<'a, K> {
             size: planner.size(model, keeping.is_light()),
             codebook: Codebook::new(model),
             shapes: Vec::new(),
-            met: meet(model, keeping.as_ref(), None, planner.episodes, seed),
+            met: meet(model, keeping.as_ref(), Walk::Wary, planner.episodes, seed),
             points: planner.first_points(model),
             plan: None,
             earlier: None,
@@ -231,7 +232,8 @@ impl<'a, K: Keeping> Course<'a, K> {
         let earned = self.earned(&values, &updater);
         if round + 1 < self.size.rounds {
             let seed = self.seed.wrapping_add(2 + round as u64);
-            self.met = meet(model, keeping, Some(&values), planner.episodes, seed);
+            let walk = Walk::Following(&values);
+            self.met = meet(model, keeping, walk, planner.episodes, seed);
             self.refine_grid(rows, &found, planned);
             self.plan = Some(values.clone());
         }
@@ -338,7 +340,7 @@ impl CodebookPlanner {
     fn size(&self, model: &Model, light: bool) -> Size {
         let or = |set: Option<usize>, quick, slow| set.unwrap_or(if light { quick } else { slow });
         Size {
-            strata: or(self.strata, 120, 40),
+            strata: or(self.strata, 120, 60),
             rounds: self.rounds,
             refined: or(self.refined, 4000, 1000),
             // Single numbers can be put in order, and each of them counts.

@@ -8,7 +8,7 @@ use crate::belief::{
 };
 use crate::error::Result;
 use crate::model::{Interval, Model, TrackerKind};
-use crate::solve::codebook::meet;
+use crate::solve::codebook::{Walk, meet};
 use crate::solve::settings::{KEPT, ensure_count};
 
 /// Strata are at least so far apart, in units of the logarithm of a standard deviation.
@@ -66,7 +66,8 @@ fn in_full<K: Keeping>(
     updater: fn(Coded<K>) -> Updater,
     strata: Strata,
 ) -> CodedSpace {
-    let met = meet(body, keeping.as_ref(), None, strata.walks, strata.seed);
+    let (walk, walks) = (Walk::Blind, strata.walks);
+    let met = meet(body, keeping.as_ref(), walk, walks, strata.seed);
     let moments: Vec<Moments> = met.into_iter().map(|met| met.moments).collect();
     let mut codebook = Codebook::new(body);
     codebook.represent(&moments, APART, strata.most);
