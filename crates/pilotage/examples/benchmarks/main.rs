@@ -1,10 +1,12 @@
 //! Makes docs/benchmarks.md: what plans promise and earn, on problems that others publish numbers for; or docs/gallery.md: the same of
-//! problems that people have; or docs/learners.md: what learners earn beside planners, on all built-in problems.
+//! problems that people have; or docs/learners.md: what learners earn beside planners, on all built-in problems; or docs/seeds.md: how much
+//! it hangs on the seed.
 //!
 //! ```sh
 //! cargo run --release -p pilotage --example benchmarks -- --out docs/benchmarks.md [PROBLEM ...]
 //! cargo run --release -p pilotage --example benchmarks -- --gallery target/gallery --out docs/gallery.md [PROBLEM ...]
 //! cargo run --release -p pilotage --example benchmarks -- --learners --out docs/learners.md [PROBLEM ...]
+//! cargo run --release -p pilotage --example benchmarks -- --seeds 3 --out docs/seeds.md [PROBLEM ...]
 //! ```
 //!
 //! What learners earn is kept in docs/data/learners.json as it is measured, so that this may be stopped and gone on with; with `--kept` the
@@ -17,6 +19,7 @@ mod gallery;
 mod learners;
 mod published;
 mod row;
+mod seeds;
 
 use std::error::Error;
 
@@ -41,15 +44,30 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let out = value_of("--out", &mut arguments);
     let folder = value_of("--gallery", &mut arguments);
+    let seeds = value_of("--seeds", &mut arguments);
     let [learners, kept] = ["--learners", "--kept"].map(|flag| is_given(flag, &mut arguments));
+    if kept && !(learners && arguments.is_empty()) {
+        return Err(
+            "--kept goes with --learners, and with no problems: all that is kept is shown".into(),
+        );
+    }
+    if [folder.is_some(), learners, seeds.is_some()]
+        .iter()
+        .filter(|given| **given)
+        .count()
+        > 1
+    {
+        return Err("one page at a time: --gallery, --learners or --seeds".into());
+    }
     for name in &arguments {
         pilotage::scenario::find(name)?;
     }
     let asked = |name: &str| arguments.is_empty() || arguments.iter().any(|other| other == name);
-    let page = match (folder, learners) {
+    let page = match (folder, seeds) {
         (Some(folder), _) => gallery::page(&folder, &asked)?,
-        (None, true) => learners::page(&arguments, kept)?,
-        (None, false) => published::page(&asked)?,
+        (None, Some(seeds)) => seeds::page(seeds.parse()?, &asked)?,
+        (None, None) if learners => learners::page(&arguments, kept)?,
+        (None, None) => published::page(&asked)?,
     };
     match out {
         Some(path) => std::fs::write(path, page)?,

@@ -1,5 +1,7 @@
 //! docs/benchmarks.md: problems that others publish numbers for.
 
+use std::error::Error;
+
 use pilotage::scenario;
 use serde::Deserialize;
 
@@ -9,7 +11,7 @@ use crate::row::{HEAD, Row, SEED, Task, estimate};
 /// Problems, and what is known of them from elsewhere.
 const DATA: &str = include_str!("../../../../docs/data/benchmarks.toml");
 
-const EPISODES: usize = 20_000;
+pub const EPISODES: usize = 20_000;
 
 #[derive(Deserialize)]
 struct Data {
@@ -17,15 +19,16 @@ struct Data {
 }
 
 #[derive(Deserialize)]
-struct Problem {
-    name: String,
-    nodes: Vec<usize>,
+pub struct Problem {
+    pub name: String,
+    /// Most nodes of its trees.
+    pub nodes: Vec<usize>,
     /// Whether it is also solved for agents that are told their start.
     #[serde(default)]
     told: bool,
     /// Digits behind the point of what is earned.
     #[serde(default = "usual_digits")]
-    digits: usize,
+    pub digits: usize,
     #[serde(default)]
     published: Vec<Published>,
 }
@@ -41,11 +44,17 @@ struct Published {
     source: String,
 }
 
-pub fn page(asked: &dyn Fn(&str) -> bool) -> Page {
+/// Those problems that are asked for.
+pub fn problems(asked: &dyn Fn(&str) -> bool) -> Result<Vec<Problem>, Box<dyn Error>> {
     let data: Data = toml::from_str(DATA)?;
+    let problems = data.problem.into_iter();
+    Ok(problems.filter(|problem| asked(&problem.name)).collect())
+}
+
+pub fn page(asked: &dyn Fn(&str) -> bool) -> Page {
     let mut page = heading();
-    for problem in data.problem.iter().filter(|problem| asked(&problem.name)) {
-        page += &section(problem)?;
+    for problem in problems(asked)? {
+        page += &section(&problem)?;
     }
     Ok(page)
 }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub const SEED: u64 = 1;
 
 /// What is to be measured.
-#[derive(Clone, Default, Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Task {
     /// A built-in model or a model file.
@@ -25,8 +25,23 @@ pub struct Task {
     /// The most nodes of the tree, where that is limited.
     pub most: Option<usize>,
     pub episodes: usize,
+    pub seed: u64,
     /// Where the automaton is kept.
     pub keep: Option<String>,
+}
+
+impl Default for Task {
+    fn default() -> Self {
+        Self {
+            problem: String::new(),
+            solver: None,
+            tree: false,
+            most: None,
+            episodes: 0,
+            seed: SEED,
+            keep: None,
+        }
+    }
 }
 
 /// Mean and standard error.
@@ -88,14 +103,14 @@ impl Task {
         let request = Request {
             nodes: self.most,
             loss: form.has_size().then_some(0.0),
-            seed: SEED,
+            seed: self.seed,
             ..Request::form(form)
         };
         let solution = solve(&solver, &scenario, &request, &Silent)?;
         let seconds = processor_time();
         let options = Options {
             episodes: self.episodes,
-            seed: SEED + 100,
+            seed: self.seed + 100,
         };
         let earned = solution.earned(&scenario, options, &Silent)?;
         let pair = |estimate: Estimate| (estimate.mean, estimate.stderr);
