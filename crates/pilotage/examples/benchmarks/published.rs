@@ -71,28 +71,31 @@ fn heading() -> String {
     )
 }
 
+/// The tree of at most so many nodes for a problem, by whichever planner is the first for it.
+pub fn measured(name: &str, most: Option<usize>, seed: u64) -> Result<Row, String> {
+    let task = Task {
+        problem: name.to_owned(),
+        tree: true,
+        most,
+        episodes: EPISODES,
+        seed,
+        ..Task::default()
+    };
+    task.measure_apart()
+}
+
 fn section(problem: &Problem) -> Page {
     let model = scenario::find(&problem.name)?.model;
-    let measured = |name: String, most: Option<usize>| {
-        let task = Task {
-            problem: name,
-            tree: true,
-            most,
-            episodes: EPISODES,
-            ..Task::default()
-        };
-        task.measure_apart()
-    };
     let mut text = format!("\n## `{}`\n\n{}\n\n", problem.name, model.about);
     text += HEAD;
     for most in &problem.nodes {
-        text += &measured(problem.name.clone(), Some(*most))?.line(problem.digits);
+        text += &measured(&problem.name, Some(*most), SEED)?.line(problem.digits);
     }
     if problem.told {
         let most = problem.nodes.iter().copied().max();
         let starts = 1..=model.start.len();
         let rows: Result<Vec<Row>, _> = starts
-            .map(|start| measured(format!("{}@{start}", problem.name), most))
+            .map(|start| measured(&format!("{}@{start}", problem.name), most, SEED))
             .collect();
         text += &told(&rows?, problem.digits);
     }

@@ -1,10 +1,8 @@
 //! docs/seeds.md: how much what is earned hangs on the seed that it was planned with.
 
-use std::error::Error;
-
 use crate::Page;
-use crate::published::{EPISODES, Problem, problems};
-use crate::row::{Row, Task, estimate};
+use crate::published::{EPISODES, Problem, measured, problems};
+use crate::row::{Row, estimate};
 
 pub fn page(seeds: u64, asked: &dyn Fn(&str) -> bool) -> Page {
     if seeds < 2 {
@@ -35,18 +33,8 @@ fn heading(seeds: u64) -> String {
 }
 
 fn line(problem: &Problem, most: usize, seeds: u64) -> Page {
-    let measured = |seed| -> Result<Row, Box<dyn Error>> {
-        let task = Task {
-            problem: problem.name.clone(),
-            tree: true,
-            most: Some(most),
-            episodes: EPISODES,
-            seed,
-            ..Task::default()
-        };
-        Ok(task.measure_apart()?)
-    };
-    let rows: Vec<Row> = (1..=seeds).map(measured).collect::<Result<_, _>>()?;
+    let by_seed = |seed| measured(&problem.name, Some(most), seed);
+    let rows: Vec<Row> = (1..=seeds).map(by_seed).collect::<Result<_, _>>()?;
     let digits = problem.digits;
     let each: String = rows
         .iter()

@@ -11,6 +11,9 @@ use crate::policy::{Automaton, Matching};
 use crate::scenario::find;
 use crate::solve::rollout::Judged;
 
+/// Means in a plane, with what is expected of two actions there.
+type Beliefs = Vec<([f64; 2], [f64; 2])>;
+
 /// Beliefs of a plane, with what is expected of two actions.
 fn collected(beliefs: impl IntoIterator<Item = ([f64; 2], [f64; 2])>) -> Collected {
     let scenario = find("maze-2d-unbounded").unwrap();
@@ -105,17 +108,25 @@ fn a_slanted_border_takes_one_test() {
     }
 }
 
+prop_compose! {
+    /// Beliefs anywhere, in which anything may be best.
+    fn any_beliefs()(
+        beliefs in prop::collection::vec(
+            ((-1.0f64..1.0, -1.0f64..1.0), (0.0f64..1.0, 0.0f64..1.0)), 1..120),
+    ) -> Beliefs {
+        beliefs.into_iter().map(|((x, y), (a, b))| ([x, y], [a, b])).collect()
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     /// Whatever things cost, refining never makes a tree worse, no size is exceeded, and every belief is at one leaf.
     #[test]
     fn refining_never_costs_and_cutting_back_keeps_to_the_size(
-        beliefs in prop::collection::vec(
-            ((-1.0f64..1.0, -1.0f64..1.0), (0.0f64..1.0, 0.0f64..1.0)), 1..120),
+        beliefs in any_beliefs(),
         leaves in 1usize..9,
     ) {
-        let beliefs = beliefs.into_iter().map(|((x, y), (a, b))| ([x, y], [a, b]));
         let collected = collected(beliefs);
         let all = collected.all();
         for mut growth in Growth::straight_and_slanted(&collected, &all) {
@@ -136,11 +147,9 @@ proptest! {
     /// Only tests about which something changed are looked at again, and that is as good as looking at all.
     #[test]
     fn what_is_settled_need_not_be_looked_at(
-        beliefs in prop::collection::vec(
-            ((-1.0f64..1.0, -1.0f64..1.0), (0.0f64..1.0, 0.0f64..1.0)), 1..120),
+        beliefs in any_beliefs(),
         leaves in 1usize..5,
     ) {
-        let beliefs = beliefs.into_iter().map(|((x, y), (a, b))| ([x, y], [a, b]));
         let collected = collected(beliefs);
         let all = collected.all();
         for mut growth in Growth::straight_and_slanted(&collected, &all) {
