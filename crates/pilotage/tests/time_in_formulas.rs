@@ -71,7 +71,6 @@ fn codebook() -> CodebookPlanner {
         points: Some(65),
         rounds: 2,
         episodes: 60,
-        refined: Some(300),
         ..CodebookPlanner::default()
     }
 }

@@ -181,7 +181,6 @@ pub fn small(entry: &Entry, model: &Model) -> Solver {
         ("readings", "3"),
         ("rounds", "1"),
         ("episodes", "5"),
-        ("refined", "20"),
         ("beliefs", "12"),
         ("bins", "4"),
     ];

@@ -5,8 +5,8 @@
 //!
 //! 1. Beliefs are met by acting at random, though not so that the episode is over, and strata chosen among them so that all are near one.
 //! 2. From every stratum and mean of the grid every action leads to the beliefs after evenly spread readings, which are read as the strata
-//!    that they lie between and the points of the grid around their mean. Where beliefs in full were met, they take the place of what
-//!    the codebook makes of them. Once there is a plan, only those are looked at that beliefs were met near: of the others it is kept.
+//!    that they lie between and the points of the grid around their mean. Once there is a plan, only those are looked at that beliefs were
+//!    met near: of the others it is kept.
 //! 3. Value iteration on these sparse rows.
 //! 4. The greedy policy is run, with some actions at random; the beliefs it meets go back to 1, where strata of them join the others.
 //!
@@ -32,8 +32,7 @@ use crate::belief::{
 use crate::error::Result;
 use crate::model::{Model, TrackerKind};
 use crate::progress::Progress;
-use crate::scenario::Scenario;
-use crate::simulate::{Options, evaluate};
+use crate::solve::deviation::{self, Budget};
 pub use grid_values::GridValues;
 use means::Means;
 use meet::Met;
@@ -59,9 +58,6 @@ pub struct CodebookPlanner {
     pub rounds: usize,
     /// Episodes that are run to meet beliefs in a round; at least 1, at most a million.
     pub episodes: usize,
-    /// Most beliefs in full that a round refines on; at least 0, or `auto` for 4000 where a step of a belief takes little time and 1000
-    /// elsewhere.
-    pub refined: Option<usize>,
     /// Largest change of a value in the last sweep, as a share of the largest value; more than 0.
     pub tolerance: f64,
 }
@@ -75,7 +71,6 @@ impl Default for CodebookPlanner {
             readings: None,
             rounds: 4,
             episodes: 200,
-            refined: None,
             tolerance: 1e-6,
         }
     }
@@ -143,8 +138,9 @@ impl Planner for CodebookPlanner {
 struct Size {
     strata: usize,
     rounds: usize,
-    refined: usize,
     readings: usize,
+    /// Steps in which the plan of a round is tried.
+    trial_steps: usize,
 }
 
 impl Size {
@@ -162,10 +158,16 @@ impl Size {
 /// What a round of planning found.
 struct Round {
     values: GridValues,
-    updater: Updater,
-    codebook: Arc<Codebook>,
+    space: CodedSpace,
     planned: f64,
-    earned: f64,
+    /// What it earns where the model holds in each of some episodes, which are the same for all rounds.
+    returns: Vec<f64>,
+}
+
+impl Round {
+    fn earns_more_than(&self, other: &Self) -> bool {
+        deviation::gain(&self.returns, &other.returns).mean > 0.0
+    }
 }
 
 /// Planning in rounds, and what goes from one to the next.
@@ -212,7 +214,7 @@ impl<'a, K: Keeping> Course<'a, K> {
         }
     }
 
-    fn round(&mut self, round: usize) -> Round {
+    fn round(&mut self, round: usize, best: Option<&Round>) -> Round {
         let (planner, model) = (self.planner, self.model);
         let rows = self.rows(round);
         let found = rows.solve(model.discount, planner.tolerance);
@@ -228,8 +230,8 @@ impl<'a, K: Keeping> Course<'a, K> {
         let actions = model.actions.len();
         let values = GridValues::new(rows.means.clone(), Arc::clone(&codebook), &found, actions);
         let coded = Coded::new(model, Arc::clone(&self.keeping), Arc::clone(&codebook));
-        let updater = (self.updater)(coded);
-        let earned = self.earned(&values, &updater);
+        let space = CodedSpace::new(model, (self.updater)(coded), &codebook);
+        let returns = self.returns(&values, &space, best);
         if round + 1 < self.size.rounds {
             let seed = self.seed.wrapping_add(2 + round as u64);
             let walk = Walk::Following(&values);
@@ -239,10 +241,9 @@ impl<'a, K: Keeping> Course<'a, K> {
         }
         Round {
             values,
-            updater,
-            codebook,
+            space,
             planned,
-            earned,
+            returns,
         }
     }
 
@@ -264,21 +265,21 @@ impl<'a, K: Keeping> Course<'a, K> {
             (&self.codebook, self.shapes.as_slice()),
             (means, self.model.episode.length),
             &self.met,
-            (self.size.refined, self.size.readings),
+            self.size.readings,
             (self.plan.as_ref(), earlier),
         )
     }
 
-    /// What the plan itself earns where the model holds.
-    fn earned(&self, values: &GridValues, updater: &Updater) -> f64 {
-        let options = Options {
-            episodes: TRIALS * self.planner.episodes,
-            seed: self.seed.wrapping_add(1),
+    /// What the plan itself earns where the model holds, found no further than it is plainly worse than the best.
+    fn returns(&self, plan: &GridValues, space: &CodedSpace, best: Option<&Round>) -> Vec<f64> {
+        let budget = Budget {
+            episodes: self.planner.episodes,
+            steps: self.size.trial_steps,
         };
-        let assumed = Scenario::assumed(self.model);
-        let silent = &crate::progress::Silent;
-        let evaluation = evaluate(&assumed, updater, values, options, silent);
-        evaluation.discounted.mean
+        let best = best.map(|best| best.returns.as_slice());
+        let seed = self.seed.wrapping_add(1);
+        let mut returns = deviation::returns(space, &[plan], budget, seed, best);
+        returns.pop().unwrap_or_default()
     }
 
     /// Chooses the points of the next round, where nobody has said how many there are, and keeps the rows if they stay.
@@ -291,7 +292,7 @@ impl<'a, K: Keeping> Course<'a, K> {
                 let bends = rows.bends(&self.codebook, found, &self.met).into_iter();
                 let off = bends.map(|bend| horizon * bend / (OFF * planned.abs()));
                 let shares = self.size.strata * self.model.actions.len();
-                finer(&self.points, off, MOST_ROWS / shares.max(1))
+                finer(&self.points, off, MOST_VALUES / shares.max(1))
             }
         };
         self.earlier = (points == self.points).then_some(rows);
@@ -313,8 +314,8 @@ impl CodebookPlanner {
         let mut best: Option<Round> = None;
         for round in 0..rounds {
             observer.progress("rounds", round as u64, rounds as u64);
-            let found = course.round(round);
-            if best.as_ref().is_none_or(|best| found.earned > best.earned) {
+            let found = course.round(round, best.as_ref());
+            if best.as_ref().is_none_or(|best| found.earns_more_than(best)) {
                 best = Some(found);
             }
         }
@@ -326,12 +327,11 @@ impl CodebookPlanner {
                 range: "at least 1",
             });
         };
-        let space = CodedSpace::new(model, best.updater, &best.codebook);
         Ok(Plan {
             value: Some(best.planned),
             ..Plan::of(Found::Rule {
                 policy: Box::new(best.values),
-                space: Box::new(space),
+                space: Box::new(best.space),
             })
         })
     }
@@ -342,7 +342,7 @@ impl CodebookPlanner {
         Size {
             strata: or(self.strata, 120, 60),
             rounds: self.rounds,
-            refined: or(self.refined, 4000, 1000),
+            trial_steps: self.episodes * if light { TRIAL_STEPS.0 } else { TRIAL_STEPS.1 },
             // Single numbers can be put in order, and each of them counts.
             readings: self.readings.unwrap_or(match model.sensor_dim() {
                 0 | 1 => 15,
@@ -404,11 +404,12 @@ fn finer(points: &[usize], off: impl Iterator<Item = f64>, most: usize) -> Vec<u
 /// Share of the plan by which straight lines between points may be off along a variable, all steps of an episode together.
 const OFF: f64 = 0.01;
 
-/// Most rows that a grid is made finer for: about a kilobyte each.
-const MOST_ROWS: usize = 600_000;
+/// Most values of actions that a grid is made finer for. Rows are found of few of them: of those that beliefs are met near.
+const MOST_VALUES: usize = 1_200_000;
 
 /// Steps in which a finer grid is given up where it has too many points.
 const SHARES: usize = 8;
 
-/// Rounds are compared by so many times as many episodes as beliefs are met in.
-const TRIALS: usize = 5;
+/// Steps in which the plan of a round is tried, for each episode in which beliefs are met: where a step of a belief takes little time, and
+/// elsewhere.
+const TRIAL_STEPS: (usize, usize) = (1000, 100);

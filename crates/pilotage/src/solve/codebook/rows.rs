@@ -1,7 +1,5 @@
 //! The decision process on strata and a grid of means, as sparse rows.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use super::GridValues;
 use super::means::Means;
 use super::meet::Met;
@@ -35,12 +33,7 @@ pub(super) struct Rows {
     actions: usize,
     /// Where an episode starts: states with weights.
     start: Vec<(u32, f32)>,
-    /// States whose rows are of beliefs that were met.
-    refined: BTreeSet<usize>,
 }
-
-/// Most beliefs in full that one state is refined on.
-const SHARED: usize = 4;
 
 /// Most sweeps of value iteration.
 const SWEEPS: usize = 5000;
@@ -133,30 +126,16 @@ fn merged(mut entries: Vec<(u32, f64)>) -> Vec<(u32, f32)> {
         .collect()
 }
 
-/// The average of rows.
-fn averaged(rows: &[Row]) -> Row {
-    let share = 1.0 / rows.len() as f64;
-    let next = rows.iter().flat_map(|row| row.next.iter());
-    Row {
-        reward: share * rows.iter().map(|row| row.reward).sum::<f64>(),
-        restarted: share * rows.iter().map(|row| row.restarted).sum::<f64>(),
-        next: merged(
-            next.map(|&(state, weight)| (state, share * f64::from(weight)))
-                .collect(),
-        ),
-    }
-}
-
 impl Rows {
-    /// The rows of a codebook, whose strata have the shapes of beliefs in full, refined on beliefs that were met, for episodes of so many steps.
-    /// Once there is a plan, rows are found only for the states that beliefs that were met lie between: elsewhere it stays as it is. Earlier
-    /// rows on the same grid are taken over where nothing was or is refined: strata stay what they are when others join them.
+    /// The rows of a codebook, whose strata have the shapes of beliefs in full, for episodes of so many steps. Once there is a plan, rows are
+    /// found only for the states that beliefs that were met lie between: elsewhere it stays as it is. Earlier rows on the same grid are taken
+    /// over: strata stay what they are when others join them.
     pub(super) fn new<K: Keeping>(
         (keeping, coarse): (&K, &K),
         (codebook, shapes): (&Codebook, &[K::Full]),
         (means, length): (Means, usize),
         met: &[Met<K::Full>],
-        (most, readings): (usize, usize),
+        readings: usize,
         (plan, earlier): (Option<&GridValues>, Option<Self>),
     ) -> Self {
         let reader = Reader {
@@ -167,14 +146,10 @@ impl Rows {
         let actions = keeping.actions();
         let points = means.len();
         let states = codebook.len() * points;
-        let refined = refined::<K>(&reader, met, most);
         let near = reader.near(met);
         let kept = |state: usize| {
-            let rows = earlier
-                .as_ref()
-                .filter(|rows| !rows.refined.contains(&state));
-            let known = rows.and_then(|rows| rows.states.get(state));
-            matches!(known, Some(State::Rows(_))) && !refined.contains_key(&state)
+            let known = earlier.as_ref().and_then(|rows| rows.states.get(state));
+            matches!(known, Some(State::Rows(_)))
         };
         let of_state = |state: usize| -> Option<State> {
             if kept(state) {
@@ -185,24 +160,9 @@ impl Rows {
             if let Some(plan) = plan.filter(|_| !near[state]) {
                 return Some(State::Worth(plan.values_between(&stratum.at(mean))));
             }
-            let (keeping, fulls) = match refined.get(&state) {
-                Some(fulls) => {
-                    let moved = |&i: &usize| keeping.moved_to(&met[i].full, &mean);
-                    (keeping, fulls.iter().map(moved).collect::<Vec<K::Full>>())
-                }
-                None => {
-                    let full = coarse.moved_to(&shapes[state / points], &mean);
-                    (coarse, vec![full])
-                }
-            };
-            let of_action = |action: usize| {
-                let of =
-                    |full: &K::Full| reader.row(keeping, (full, stratum.step), action, readings);
-                match fulls.as_slice() {
-                    [full] => of(full),
-                    fulls => averaged(&fulls.iter().map(of).collect::<Vec<_>>()),
-                }
-            };
+            let full = coarse.moved_to(&shapes[state / points], &mean);
+            let of_action =
+                |action: usize| reader.row(coarse, (&full, stratum.step), action, readings);
             Some(State::Rows((0..actions).map(of_action).collect()))
         };
         let found = parallel::map(states, of_state);
@@ -222,7 +182,6 @@ impl Rows {
             states,
             actions,
             start: merged(start),
-            refined: refined.into_keys().collect(),
             means,
             length,
         }
@@ -345,25 +304,3 @@ const NOTHING: f64 = 1e-3;
 
 /// So many times as many readings are thought of at the start.
 const FINE: usize = 10;
-
-/// Of the beliefs that were met, those that take the place of a state.
-fn refined<K: Keeping>(
-    reader: &Reader<'_>,
-    met: &[Met<K::Full>],
-    most: usize,
-) -> BTreeMap<usize, Vec<usize>> {
-    let stride = met.len().div_ceil(most.max(1)).max(1);
-    let mut refined: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    let mut code = Vec::new();
-    for (i, met) in met.iter().enumerate().step_by(stride) {
-        let stratum = reader.codebook.nearest(&met.moments, &mut code);
-        let point = reader.means.nearest(&met.moments.mean);
-        let fulls = refined
-            .entry(stratum * reader.means.len() + point)
-            .or_default();
-        if fulls.len() < SHARED {
-            fulls.push(i);
-        }
-    }
-    refined
-}
