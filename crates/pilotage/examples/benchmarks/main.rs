@@ -51,12 +51,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             "--kept goes with --learners, and with no problems: all that is kept is shown".into(),
         );
     }
-    if [folder.is_some(), learners, seeds.is_some()]
-        .iter()
-        .filter(|given| **given)
-        .count()
-        > 1
-    {
+    let pages = [folder.is_some(), learners, seeds.is_some()];
+    if pages.into_iter().filter(|given| *given).count() > 1 {
         return Err("one page at a time: --gallery, --learners or --seeds".into());
     }
     for name in &arguments {

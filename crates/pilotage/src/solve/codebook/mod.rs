@@ -270,7 +270,7 @@ impl<'a, K: Keeping> Course<'a, K> {
         )
     }
 
-    /// What the plan itself earns where the model holds, found no further than it is plainly worse than the best.
+    /// What the plan itself earns where the model holds, in fewer episodes if it is plainly worse than the best.
     fn returns(&self, plan: &GridValues, space: &CodedSpace, best: Option<&Round>) -> Vec<f64> {
         let budget = Budget {
             episodes: self.planner.episodes,

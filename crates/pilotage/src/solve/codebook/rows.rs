@@ -146,7 +146,7 @@ impl Rows {
         let actions = keeping.actions();
         let points = means.len();
         let states = codebook.len() * points;
-        let near = reader.near(met);
+        let stands = plan.map(|plan| (plan, reader.near(met)));
         let kept = |state: usize| {
             let known = earlier.as_ref().and_then(|rows| rows.states.get(state));
             matches!(known, Some(State::Rows(_)))
@@ -157,7 +157,9 @@ impl Rows {
             }
             let mean = means.point(state % points);
             let stratum = codebook.stratum(state / points);
-            if let Some(plan) = plan.filter(|_| !near[state]) {
+            if let Some((plan, near)) = &stands
+                && !near[state]
+            {
                 return Some(State::Worth(plan.values_between(&stratum.at(mean))));
             }
             let full = coarse.moved_to(&shapes[state / points], &mean);
