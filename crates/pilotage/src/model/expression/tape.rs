@@ -53,13 +53,15 @@ pub(super) enum Binary {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Op {
     Constant(f64),
-    Variable(usize),
+    Variable(u32),
     Unary(Unary),
     Binary(Binary),
     /// A binary operation whose right side is a constant.
     WithConstant(Binary, f64),
     /// A binary operation whose right side is a variable.
-    WithVariable(Binary, usize),
+    WithVariable(Binary, u32),
+    /// A binary operation of a variable and a constant.
+    OfVariable(Binary, u32, f64),
     /// The square of a value.
     Square,
     /// Of a condition and two values, the first value where the condition is true.
@@ -87,7 +89,7 @@ impl Tape {
     }
 
     pub(super) fn variable(&mut self, variable: usize) {
-        self.ops.push(Op::Variable(variable));
+        self.ops.push(Op::Variable(variable as u32));
         self.hold();
     }
 
@@ -111,10 +113,37 @@ impl Tape {
                 self.fold(2, binary.of(x, y), Op::Binary(binary));
             }
             [.., Op::Constant(2.0)] if binary == Binary::Power => self.replace(1, Op::Square),
+            [.., Op::Variable(x), Op::Constant(y)] => {
+                self.replace(2, Op::OfVariable(binary, x, y));
+            }
             [.., Op::Constant(y)] => self.replace(1, Op::WithConstant(binary, y)),
             [.., Op::Variable(y)] => self.replace(1, Op::WithVariable(binary, y)),
-            _ => self.ops.push(Op::Binary(binary)),
+            _ => self.turned(binary),
         }
+    }
+
+    /// Adds and multiplies the other way round where that is shorter: it comes to the same.
+    fn turned(&mut self, binary: Binary) {
+        let turns = matches!(binary, Binary::Add | Binary::Multiply);
+        let left = self.last_begins().checked_sub(1).filter(|_| turns);
+        let (left, op) = match left.map(|left| (left, self.ops[left])) {
+            Some((left, Op::Constant(x))) => (left, Op::WithConstant(binary, x)),
+            Some((left, Op::Variable(x))) => (left, Op::WithVariable(binary, x)),
+            _ => return self.ops.push(Op::Binary(binary)),
+        };
+        self.ops.remove(left);
+        self.ops.push(op);
+    }
+
+    /// Where the operations begin of which the last value is made.
+    fn last_begins(&self) -> usize {
+        let mut missing = 1;
+        let from_the_end = self.ops.iter().enumerate().rev();
+        let mut begins = from_the_end.skip_while(|(_, op)| {
+            missing = missing - 1 + op.takes();
+            missing > 0
+        });
+        begins.next().map_or(0, |(at, _)| at)
     }
 
     pub(super) fn choose(&mut self) {
@@ -139,7 +168,9 @@ impl Tape {
     /// The variables that are used, each as often as it is.
     pub(super) fn variables(&self) -> impl Iterator<Item = usize> {
         self.ops.iter().filter_map(|op| match *op {
-            Op::Variable(variable) | Op::WithVariable(_, variable) => Some(variable),
+            Op::Variable(variable)
+            | Op::WithVariable(_, variable)
+            | Op::OfVariable(_, variable, _) => Some(variable as usize),
             _ => None,
         })
     }
@@ -166,7 +197,12 @@ impl Tape {
                 Op::Variable(variable) => {
                     below[held] = last;
                     held += 1;
-                    last = variables[variable];
+                    last = variables[variable as usize];
+                }
+                Op::OfVariable(binary, variable, value) => {
+                    below[held] = last;
+                    held += 1;
+                    last = binary.of(variables[variable as usize], value);
                 }
                 Op::Unary(unary) => last = unary.of(last),
                 Op::Binary(binary) => {
@@ -174,7 +210,9 @@ impl Tape {
                     last = binary.of(below[held], last);
                 }
                 Op::WithConstant(binary, value) => last = binary.of(last, value),
-                Op::WithVariable(binary, variable) => last = binary.of(last, variables[variable]),
+                Op::WithVariable(binary, variable) => {
+                    last = binary.of(last, variables[variable as usize]);
+                }
                 Op::Square => last *= last,
                 Op::Choose => {
                     held -= 2;
@@ -185,6 +223,18 @@ impl Tape {
             }
         }
         last
+    }
+}
+
+impl Op {
+    /// Values that it takes off those that are held.
+    fn takes(self) -> usize {
+        match self {
+            Self::Constant(_) | Self::Variable(_) | Self::OfVariable(..) => 0,
+            Self::Unary(_) | Self::WithConstant(..) | Self::WithVariable(..) | Self::Square => 1,
+            Self::Binary(_) => 2,
+            Self::Choose => 3,
+        }
     }
 }
 
@@ -213,6 +263,8 @@ impl Unary {
 }
 
 impl Binary {
+    /// Inlined wherever it is used: most of what a model costs is spent here.
+    #[inline(always)]
     fn of(self, x: f64, y: f64) -> f64 {
         match self {
             Self::Add => x + y,
@@ -234,8 +286,18 @@ impl Binary {
             Self::Max if x > y || x.is_nan() => x,
             Self::Min | Self::Max => y,
             Self::Atan2 => x.atan2(y),
-            Self::Hypot => x.hypot(y),
+            Self::Hypot => hypot(x, y),
         }
+    }
+}
+
+/// The length of `(x, y)`. The general function takes several times as long as a root, and is only needed where squares leave the range of
+/// numbers.
+fn hypot(x: f64, y: f64) -> f64 {
+    let square = x * x + y * y;
+    match (1e-280..1e280).contains(&square) {
+        true => square.sqrt(),
+        false => x.hypot(y),
     }
 }
 

@@ -45,8 +45,10 @@ const IMITATING: usize = 3;
 const IMPROVING: usize = 12;
 const KEPT: usize = 3;
 
-/// A round that gains no more than this share of what is earned is a quiet one.
+/// A round that gains no more than this share of what is earned is a quiet one, and so is one whose gain is no more than so many standard
+/// errors: the best of many trees earns a little more by chance.
 const GAIN: f64 = 2e-3;
+const BY_CHANCE: f64 = 2.0;
 
 /// Beliefs judged in a round of imitation for each episode, and where these are cells about which the policy is asked in full, which takes
 /// far longer; and how many are enough in any case.
@@ -145,11 +147,11 @@ impl Trials {
         self.tried.get(self.best)
     }
 
-    /// How much more the best earns than in these returns, as a share of it.
-    fn gained(&self, before: &[f64]) -> f64 {
-        self.best().map_or(0.0, |best| {
-            let gain = deviation::gain(&best.returns, before).mean;
-            gain / best.earned().abs().max(f64::MIN_POSITIVE)
+    /// Whether the best earns more than these returns, by more than a share of it and more than by chance.
+    fn gained(&self, before: &[f64]) -> bool {
+        self.best().is_some_and(|best| {
+            let gain = deviation::gain(&best.returns, before);
+            gain.mean > (GAIN * best.earned().abs()).max(BY_CHANCE * gain.stderr)
         })
     }
 
@@ -264,8 +266,7 @@ impl Search<'_> {
             let mut collected = Collected::new(self.space, &self.bare);
             collected.extend(kept.iter().flatten().cloned());
             self.try_sizes(&collected, trials);
-            let gained = trials.gained(&earned);
-            quiet = if gained > GAIN { 0 } else { quiet + 1 };
+            quiet = if trials.gained(&earned) { 0 } else { quiet + 1 };
             if quiet == 2 {
                 return;
             }
