@@ -1,5 +1,7 @@
 //! Strata of beliefs that no level graph tells apart: everything about a belief but its mean, as one of finitely many.
 
+use smallvec::{SmallVec, smallvec};
+
 use super::full::Moments;
 use super::{Belief, StratumId};
 use crate::model::{Dynamics, Interval, ModeId, Model};
@@ -274,7 +276,7 @@ impl Codebook {
         self.write_code(moments, code);
         let mut best = (0, f64::INFINITY);
         for (id, stratum) in self.strata.iter().enumerate() {
-            let apart = distance(code, &stratum.code);
+            let apart = square_distance(code, &stratum.code);
             if apart < best.1 {
                 best = (id, apart);
             }
@@ -287,16 +289,21 @@ impl Codebook {
     /// narrower by themselves.
     pub fn between(&self, moments: &Moments, code: &mut Vec<f64>) -> Vec<(StratumId, f64)> {
         self.write_code(moments, code);
-        let mut near: Vec<(StratumId, f64)> = Vec::with_capacity(BETWEEN + 1);
+        let mut near: SmallVec<[(StratumId, f64); BETWEEN + 1]> = SmallVec::new();
+        let mut farthest = f64::INFINITY;
         for (id, stratum) in self.strata.iter().enumerate() {
-            let apart = distance(code, &stratum.code);
+            let apart = square_distance(code, &stratum.code);
+            if apart >= farthest {
+                continue;
+            }
             let place = near.partition_point(|(_, known)| *known <= apart);
-            if place < BETWEEN {
-                near.insert(place, (id, apart));
-                near.truncate(BETWEEN);
+            near.insert(place, (id, apart));
+            near.truncate(BETWEEN);
+            if near.len() == BETWEEN {
+                farthest = near[BETWEEN - 1].1;
             }
         }
-        let corners: Vec<&[f64]> = near
+        let corners: SmallVec<[&[f64]; BETWEEN]> = near
             .iter()
             .map(|(id, _)| self.strata[*id].average.as_slice())
             .collect();
@@ -368,46 +375,63 @@ fn stirred(model: &Model) -> Vec<f64> {
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (a - b) * (a - b))
-        .sum::<f64>()
-        .sqrt()
+    square_distance(a, b).sqrt()
 }
+
+fn square_distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+}
+
+/// Of the strata that a belief lies between.
+type Weights = SmallVec<[f64; BETWEEN]>;
 
 /// Weights of corners, the nearest first, that sum to 1 and are none below 0: those with the least `|sum w c - at|^2 + FARNESS sum w |c - at|^2`,
 /// found by moving weight from one corner to another as far as that gains anything.
-fn barycentric(corners: &[&[f64]], at: &[f64]) -> Vec<f64> {
-    let dim = at.len();
-    let offsets: Vec<f64> = corners
-        .iter()
-        .flat_map(|corner| corner.iter().zip(at).map(|(c, x)| c - x))
-        .collect();
+fn barycentric(corners: &[&[f64]], at: &[f64]) -> Weights {
+    // Loops whose lengths are known are unrolled.
+    match at.len() {
+        1 => barycentric_in(1, corners, at),
+        3 => barycentric_in(3, corners, at),
+        dim => barycentric_in(dim, corners, at),
+    }
+}
+
+#[inline(always)]
+fn barycentric_in(dim: usize, corners: &[&[f64]], at: &[f64]) -> Weights {
+    let corners = corners.iter().map(|corner| &corner[..dim]);
+    let offsets = corners.flat_map(|corner| corner.iter().zip(&at[..dim]).map(|(c, x)| c - x));
+    let offsets: SmallVec<[f64; 4 * BETWEEN]> = offsets.collect();
+    let count = offsets.len() / dim;
     let offset = |i: usize| &offsets[i * dim..(i + 1) * dim];
     let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-    let squares: Vec<f64> = (0..corners.len())
-        .map(|i| product(offset(i), offset(i)))
-        .collect();
-    let mut weights = vec![0.0; corners.len()];
+    let squares: Weights = (0..count).map(|i| product(offset(i), offset(i))).collect();
+    let mut weights: Weights = smallvec![0.0; count];
     if let Some(nearest) = weights.first_mut() {
         *nearest = 1.0;
     }
-    let mut off: Vec<f64> = offsets.iter().copied().take(dim).collect();
+    let mut off: SmallVec<[f64; 8]> = offsets.iter().copied().take(dim).collect();
     for _ in 0..EXCHANGES {
         let mut most: f64 = 0.0;
-        for i in 0..corners.len() {
+        for i in 0..count {
             for j in 0..i {
+                // Where nothing is, nothing can be moved.
+                if weights[i] == 0.0 && weights[j] == 0.0 {
+                    continue;
+                }
                 let (to, from) = (offset(i), offset(j));
                 let between: f64 = to.iter().zip(from).map(|(a, b)| (a - b) * (a - b)).sum();
                 if between <= 0.0 {
                     continue;
                 }
-                let slope = product(&off, to) - product(&off, from)
+                let slope = product(&off[..dim], to) - product(&off[..dim], from)
                     + 0.5 * FARNESS * (squares[i] - squares[j]);
                 let moved = (-slope / between).max(-weights[i]).min(weights[j]);
+                if moved == 0.0 {
+                    continue;
+                }
                 weights[i] = (weights[i] + moved).max(0.0);
                 weights[j] = (weights[j] - moved).max(0.0);
-                for ((off, a), b) in off.iter_mut().zip(to).zip(from) {
+                for ((off, a), b) in off[..dim].iter_mut().zip(to).zip(from) {
                     *off += moved * (a - b);
                 }
                 most = most.max(moved.abs());
@@ -464,7 +488,10 @@ mod tests {
         assert!((weights[0] - 0.5).abs() < 1e-3, "{weights:?}");
         assert!((weights[1] - 0.5).abs() < 1e-3, "{weights:?}");
         // Outside of all it is the nearest.
-        assert_eq!(barycentric(&corners, &[-1.0, 0.0]), [1.0, 0.0, 0.0]);
+        assert_eq!(
+            barycentric(&corners, &[-1.0, 0.0]).as_slice(),
+            [1.0, 0.0, 0.0]
+        );
         // A third of the way: nearly so, as what is far counts against itself.
         let weights = barycentric(&corners, &[1.0 / 3.0, 0.0]);
         assert!((weights[1] - 1.0 / 3.0).abs() < 0.02, "{weights:?}");

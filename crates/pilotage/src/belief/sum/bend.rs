@@ -1,6 +1,7 @@
 //! How much a sensor changes over the width of a Gaussian.
 
 use super::component::Component;
+use super::frame::Few;
 use super::sensor::Sensor;
 
 /// Standard deviations over which that is looked at.
@@ -40,7 +41,11 @@ impl Bend {
         }
         let mut worst = 0.0;
         sensor.ask(&component.mean);
-        let (centre, noise) = (sensor.values.clone(), sensor.noise.clone());
+        let kept = |sensor: &Sensor<'_>| {
+            let [values, noise] = [&sensor.values, &sensor.noise].map(|all| Few::from_slice(all));
+            (values, noise)
+        };
+        let (centre, noise) = kept(sensor);
         for variable in 0..n {
             let variance = component.variance(variable);
             if variance <= 0.0 {
@@ -55,7 +60,7 @@ impl Bend {
                 sensor.ask(at);
             };
             look(-1.0, sensor);
-            let (before, noise_before) = (sensor.values.clone(), sensor.noise.clone());
+            let (before, noise_before) = kept(sensor);
             look(1.0, sensor);
             for r in 0..m {
                 let k = r * m + r;

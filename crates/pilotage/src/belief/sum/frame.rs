@@ -62,12 +62,20 @@ impl Frame {
 
     /// Writes the state at `z`.
     pub(super) fn place(&self, z: &[f64], to: &mut [f64]) {
-        if self.rank == 0 {
-            return to.copy_from_slice(&self.mean);
+        // Loops whose lengths are known are unrolled.
+        match (self.rank, self.mean.as_slice()) {
+            (0, mean) => to.copy_from_slice(mean),
+            (1, &[mean]) => to[0] = mean + self.root[0] * z[0],
+            (2, &[_, _]) => self.place_in(2, z, &mut to[..2]),
+            (rank, _) => self.place_in(rank, z, to),
         }
-        let rows = self.root.chunks_exact(self.rank);
+    }
+
+    #[inline(always)]
+    fn place_in(&self, rank: usize, z: &[f64], to: &mut [f64]) {
+        let rows = self.root.chunks_exact(rank);
         for ((value, mean), row) in to.iter_mut().zip(&self.mean).zip(rows) {
-            *value = mean + row.iter().zip(z).map(|(a, z)| a * z).sum::<f64>();
+            *value = mean + row.iter().zip(&z[..rank]).map(|(a, z)| a * z).sum::<f64>();
         }
     }
 

@@ -120,8 +120,19 @@ impl Line {
     }
 
     fn posterior(&self, read: &[f64], r: usize) -> (Inner, f64) {
-        let m = self.b.len();
-        let a = |q: usize, i: usize| self.a[q * r + i];
+        // Loops whose lengths are known are unrolled.
+        match (r, self.b.len()) {
+            (1, 1) => self.posterior_in(1, 1, read),
+            (2, 1) => self.posterior_in(2, 1, read),
+            (2, 2) => self.posterior_in(2, 2, read),
+            (r, m) => self.posterior_in(r, m, read),
+        }
+    }
+
+    #[inline(always)]
+    fn posterior_in(&self, r: usize, m: usize, read: &[f64]) -> (Inner, f64) {
+        let (all, b) = (&self.a[..m * r], &self.b[..m]);
+        let a = |q: usize, i: usize| all[q * r + i];
         let mut innovation = self.noise.clone();
         for p in 0..m {
             for q in 0..m {
@@ -134,7 +145,7 @@ impl Line {
         }
         let mut spread: Few = smallvec![0.0; m * m];
         root_into(&innovation, m, &mut spread);
-        let mut apart: Few = read.iter().zip(&self.b).map(|(o, b)| o - b).collect();
+        let mut apart: Few = read.iter().zip(b).map(|(o, b)| o - b).collect();
         let log = whiten(&spread, &mut apart);
         // Row by row, the gain is `A' S^-1`; whitened once here, twice below.
         let mut gain: Few = smallvec![0.0; r * m];
@@ -161,19 +172,20 @@ impl Line {
         (
             Inner {
                 mean,
-                covariance: self.joseph(&gain, r),
+                covariance: self.joseph(r, m, &gain),
             },
             log,
         )
     }
 
     /// `(I - K A)(I - K A)' + K R K'`, which keeps its digits where hardly anything is left (P. Joseph).
-    fn joseph(&self, gain: &[f64], r: usize) -> Few {
-        let m = self.b.len();
+    #[inline(always)]
+    fn joseph(&self, r: usize, m: usize, gain: &[f64]) -> Few {
+        let (a, noise, gain) = (&self.a[..m * r], &self.noise[..m * m], &gain[..r * m]);
         let mut left: Few = smallvec![0.0; r * r];
         for i in 0..r {
             for j in 0..r {
-                let known: f64 = (0..m).map(|q| gain[i * m + q] * self.a[q * r + j]).sum();
+                let known: f64 = (0..m).map(|q| gain[i * m + q] * a[q * r + j]).sum();
                 left[i * r + j] = if i == j { 1.0 - known } else { -known };
             }
         }
@@ -183,7 +195,7 @@ impl Line {
                 let mut sum: f64 = (0..r).map(|k| left[i * r + k] * left[j * r + k]).sum();
                 for p in 0..m {
                     for q in 0..m {
-                        sum += gain[i * m + p] * self.noise[p * m + q] * gain[j * m + q];
+                        sum += gain[i * m + p] * noise[p * m + q] * gain[j * m + q];
                     }
                 }
                 covariance[i * r + j] = sum;
