@@ -83,8 +83,8 @@ fn tasks(
         true => outcome(known, name, solver).is_none(),
         false => named.iter().any(|other| other == name),
     };
-    // Of learners the first takes longest.
-    let solvers = learners.iter().rev().copied().chain([PLANNER]);
+    // A page without planners says little, and of learners the first takes longest.
+    let solvers = [PLANNER].into_iter().chain(learners.iter().rev().copied());
     solvers
         .flat_map(|solver| scenario::names().map(move |name| (name, solver)))
         .filter(|(name, solver)| wanted(name, solver))
