@@ -398,10 +398,10 @@ fn barycentric(corners: &[&[f64]], at: &[f64]) -> Weights {
 
 #[inline(always)]
 fn barycentric_in(dim: usize, corners: &[&[f64]], at: &[f64]) -> Weights {
+    let count = corners.len();
     let corners = corners.iter().map(|corner| &corner[..dim]);
     let offsets = corners.flat_map(|corner| corner.iter().zip(&at[..dim]).map(|(c, x)| c - x));
     let offsets: SmallVec<[f64; 4 * BETWEEN]> = offsets.collect();
-    let count = offsets.len() / dim;
     let offset = |i: usize| &offsets[i * dim..(i + 1) * dim];
     let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
     let squares: Weights = (0..count).map(|i| product(offset(i), offset(i))).collect();
