@@ -290,18 +290,17 @@ impl Codebook {
     pub fn between(&self, moments: &Moments, code: &mut Vec<f64>) -> Vec<(StratumId, f64)> {
         self.write_code(moments, code);
         let mut near: SmallVec<[(StratumId, f64); BETWEEN + 1]> = SmallVec::new();
-        let mut farthest = f64::INFINITY;
         for (id, stratum) in self.strata.iter().enumerate() {
             let apart = square_distance(code, &stratum.code);
-            if apart >= farthest {
+            if near
+                .get(BETWEEN - 1)
+                .is_some_and(|(_, last)| *last <= apart)
+            {
                 continue;
             }
             let place = near.partition_point(|(_, known)| *known <= apart);
             near.insert(place, (id, apart));
             near.truncate(BETWEEN);
-            if near.len() == BETWEEN {
-                farthest = near[BETWEEN - 1].1;
-            }
         }
         let corners: SmallVec<[&[f64]; BETWEEN]> = near
             .iter()
@@ -419,7 +418,7 @@ fn barycentric_in(dim: usize, corners: &[&[f64]], at: &[f64]) -> Weights {
                     continue;
                 }
                 let (to, from) = (offset(i), offset(j));
-                let between: f64 = to.iter().zip(from).map(|(a, b)| (a - b) * (a - b)).sum();
+                let between = square_distance(to, from);
                 if between <= 0.0 {
                     continue;
                 }

@@ -2,7 +2,7 @@
 
 use smallvec::smallvec;
 
-use super::frame::{Few, Frame, Inner, root_into};
+use super::frame::{self, Few, Frame, Inner, root_into};
 use super::quadrature::Rule;
 use super::sensor::Sensor;
 
@@ -58,7 +58,8 @@ pub(super) fn adapt(
         }
         let points = places.chunks_exact_mut(r).zip(weights.iter_mut());
         for ((place, weight), (node, share)) in points.zip(rule.over_density()) {
-            let squares = lay(&found.mean, &spread, node, place);
+            frame::place(&found.mean, &spread, node, place);
+            let squares: f64 = place.iter().map(|z| z * z).sum();
             frame.place(place, &mut at);
             *weight = sensor.log_likelihood(&at) - 0.5 * squares + share;
         }
@@ -82,31 +83,9 @@ pub(super) fn adapt(
     }
 }
 
-/// Writes `mean + spread node` for a lower triangular root, row by row; returns the sum of its squares.
-fn lay(mean: &[f64], spread: &[f64], node: &[f64], place: &mut [f64]) -> f64 {
-    // Loops whose lengths are known are unrolled.
-    match place.len() {
-        1 => lay_in(1, mean, spread, node, place),
-        2 => lay_in(2, mean, spread, node, place),
-        r => lay_in(r, mean, spread, node, place),
-    }
-}
-
-#[inline(always)]
-fn lay_in(r: usize, mean: &[f64], spread: &[f64], node: &[f64], place: &mut [f64]) -> f64 {
-    let (mean, spread) = (&mean[..r], &spread[..r * r]);
-    let (node, place) = (&node[..r], &mut place[..r]);
-    let mut squares = 0.0;
-    for i in 0..r {
-        let along: f64 = (0..=i).map(|k| spread[i * r + k] * node[k]).sum();
-        place[i] = mean[i] + along;
-        squares += place[i] * place[i];
-    }
-    squares
-}
-
 /// Takes in the moments of weighted points; returns how much they have changed.
 fn gather(places: &[f64], weights: &[f64], total: f64, found: &mut Inner) -> f64 {
+    // Loops whose lengths are known are unrolled.
     match found.mean.len() {
         1 => gather_in(1, places, weights, total, found),
         2 => gather_in(2, places, weights, total, found),

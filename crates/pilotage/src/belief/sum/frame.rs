@@ -65,7 +65,7 @@ impl Frame {
         // Loops whose lengths are known are unrolled.
         match (self.rank, self.mean.as_slice()) {
             (0, mean) => to.copy_from_slice(mean),
-            (1, &[mean]) => to[0] = mean + self.root[0] * z[0],
+            (1, &[_]) => self.place_in(1, z, &mut to[..1]),
             (2, &[_, _]) => self.place_in(2, z, &mut to[..2]),
             (rank, _) => self.place_in(rank, z, to),
         }
@@ -157,9 +157,19 @@ fn root_of(covariance: &[f64], n: usize, root: &mut [f64]) {
     }
 }
 
-/// Writes `mean + root z`.
+/// Writes `mean + root z` for a lower triangular root.
 pub(super) fn place(mean: &[f64], root: &[f64], z: &[f64], to: &mut [f64]) {
-    let n = mean.len();
+    match mean.len() {
+        1 => place_of(mean, root, 1, z, to),
+        2 => place_of(mean, root, 2, z, to),
+        n => place_of(mean, root, n, z, to),
+    }
+}
+
+#[inline(always)]
+fn place_of(mean: &[f64], root: &[f64], n: usize, z: &[f64], to: &mut [f64]) {
+    let (mean, root) = (&mean[..n], &root[..n * n]);
+    let (z, to) = (&z[..n], &mut to[..n]);
     for i in 0..n {
         to[i] = mean[i] + (0..=i).map(|k| root[i * n + k] * z[k]).sum::<f64>();
     }
