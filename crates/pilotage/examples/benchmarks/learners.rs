@@ -22,6 +22,10 @@ const ERRORS: f64 = 3.0;
 /// Share of a return by which a promise may miss it besides.
 const SHARE: f64 = 0.02;
 
+/// Most epochs of a learner where motion or sensor are not linear, and a step of the belief takes a thousand times as long: enough for
+/// exploration to cool, and to be calm for as long as convergence asks.
+const EPOCHS: usize = 30;
+
 /// What became of a solver: what was measured, or why it refused.
 type Outcome = Result<Row, String>;
 
@@ -95,9 +99,16 @@ fn tasks(
 fn measured(tasks: &[(&str, &str)], known: Outcomes) -> Result<Outcomes, Box<dyn Error>> {
     let outcomes = Mutex::new(known);
     let measured = tasks.iter().par_bridge().map(|(name, solver)| {
+        let learns = *solver != PLANNER;
+        let is_linear = scenario::find(name).is_ok_and(|found| found.model.is_linear());
+        let epochs = ("epoch_limit".to_owned(), EPOCHS.to_string());
         let task = Task {
             problem: (*name).to_owned(),
-            solver: (*solver != PLANNER).then(|| (*solver).to_owned()),
+            solver: learns.then(|| (*solver).to_owned()),
+            settings: match learns && !is_linear {
+                true => vec![epochs],
+                false => Vec::new(),
+            },
             episodes: EPISODES,
             ..Task::default()
         };
@@ -162,7 +173,14 @@ fn table(lines: &[Line], learners: &[&str]) -> String {
                     " {} | {} | {} |",
                     estimate(row.earned, DIGITS),
                     nodes(row),
-                    or_none(row.samples, |steps| (steps / 1000).to_string())
+                    or_none(row.samples, |steps| {
+                        let more = if row.converged == Some(false) {
+                            "+"
+                        } else {
+                            ""
+                        };
+                        format!("{}{more}", steps / 1000)
+                    })
                 ),
                 _ => " - | - | - |".to_owned(),
             };

@@ -20,6 +20,8 @@ pub struct Task {
     pub problem: String,
     /// The first planner for it, unless one is named.
     pub solver: Option<String>,
+    /// What the solver is told, by name and as in JSON.
+    pub settings: Vec<(String, String)>,
     /// A decision tree, rather than what the solver gives unless it is told.
     pub tree: bool,
     /// The most nodes of the tree, where that is limited.
@@ -35,6 +37,7 @@ impl Default for Task {
         Self {
             problem: String::new(),
             solver: None,
+            settings: Vec::new(),
             tree: false,
             most: None,
             episodes: 0,
@@ -62,6 +65,9 @@ pub struct Row {
     pub solver: String,
     /// Steps of experience of a learner.
     pub samples: Option<u64>,
+    /// Whether more of them would change nothing, where it was asked.
+    #[serde(default)]
+    pub converged: Option<bool>,
     /// Processor time of planning and compiling, all cores together.
     pub seconds: Option<f64>,
     pub mebibytes: Option<f64>,
@@ -95,7 +101,7 @@ impl Task {
             Some(name) => registry.find(name)?,
             None => registry.first_for(&scenario.model)?,
         };
-        let solver = entry.solver(&[])?;
+        let solver = entry.solver(&self.settings)?;
         let form = match self.tree {
             true => Form::Tree,
             false => solver.form(),
@@ -129,6 +135,7 @@ impl Task {
                 .map(|rule| (pair(rule.earned.discounted), pair(rule.less))),
             solver: entry.name().to_owned(),
             samples: solution.samples,
+            converged: Some(solution.converged),
             seconds,
             mebibytes: peak(),
             remarks: earned.remarks,

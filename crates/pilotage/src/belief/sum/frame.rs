@@ -209,7 +209,7 @@ fn whiten_of(root: &[f64], n: usize, x: &mut [f64]) -> f64 {
 }
 
 /// Volumes of which the logarithm need not be taken yet: one for all pivots is faster than one for each.
-const SAFE: std::ops::Range<f64> = 1e-100..1e100;
+pub(super) const SAFE: std::ops::Range<f64> = 1e-100..1e100;
 
 /// `ln 2 pi`.
 pub(super) const LOG_TAU: f64 = 1.837_877_066_409_345_3;

@@ -1,7 +1,9 @@
 //! Fewer Gaussians: the hopeless are dropped, those most alike merged so that moments stay.
 
+use smallvec::smallvec;
+
 use super::component::Component;
-use super::frame::root;
+use super::frame::{Few, SAFE};
 use crate::model::{VariableKind, wrapped};
 
 /// Components of less weight are dropped.
@@ -150,10 +152,14 @@ impl Likeness {
                 let xy = entry(1, x * y);
                 of((xx * yy - xy * xy).max(f64::MIN_POSITIVE))
             }
-            _ => {
-                let mut both = one.clone();
-                self.merge(&mut both, other);
-                Some(cost(self.size(&both.covariance)))
+            n => {
+                let apart: Few = (0..n).map(apart).collect();
+                let pivots = self.pivots(|i, j| entry(i * n + j, apart[i] * apart[j]));
+                let determinant: f64 = pivots.iter().product();
+                match SAFE.contains(&determinant) {
+                    true => of(determinant),
+                    false => Some(cost(pivots.into_iter().map(f64::ln).sum())),
+                }
             }
         };
         cost.filter(|cost| *cost < below)
@@ -171,15 +177,41 @@ impl Likeness {
                 determinant.max(f64::MIN_POSITIVE).ln()
             }
             _ => {
-                let mut lifted = covariance.to_vec();
-                for i in 0..n {
-                    lifted[i * n + i] += floor(i);
+                let pivots = self.pivots(|i, j| covariance[i * n + j]);
+                let determinant: f64 = pivots.iter().product();
+                match SAFE.contains(&determinant) {
+                    true => determinant.ln(),
+                    false => pivots.into_iter().map(f64::ln).sum(),
                 }
-                let root = root(&lifted, n);
-                let pivots = (0..n).map(|i| root[i * n + i].max(self.floors[i]));
-                2.0 * pivots.map(f64::ln).sum::<f64>()
             }
         }
+    }
+
+    /// Variances of each variable given those before it, of which the determinant of a covariance is the product, with the floors
+    /// added; none is less than its floor.
+    fn pivots(&self, covariance: impl Fn(usize, usize) -> f64) -> Few {
+        // Loops whose lengths are known are unrolled.
+        match self.floors.len() {
+            3 => self.pivots_of(3, covariance),
+            n => self.pivots_of(n, covariance),
+        }
+    }
+
+    #[inline(always)]
+    fn pivots_of(&self, n: usize, covariance: impl Fn(usize, usize) -> f64) -> Few {
+        let mut pivots: Few = smallvec![0.0; n];
+        // Row by row: what a variable shares with each before it, a share of that one's pivot.
+        let mut shares: Few = smallvec![0.0; n * n];
+        for i in 0..n {
+            for j in 0..i {
+                let before = (0..j).map(|k| shares[i * n + k] * shares[j * n + k] * pivots[k]);
+                shares[i * n + j] = (covariance(i, j) - before.sum::<f64>()) / pivots[j];
+            }
+            let before = (0..i).map(|k| shares[i * n + k] * shares[i * n + k] * pivots[k]);
+            let floor = (self.floors[i] * self.floors[i]).max(f64::MIN_POSITIVE);
+            pivots[i] = (covariance(i, i) + floor - before.sum::<f64>()).max(floor);
+        }
+        pivots
     }
 }
 
@@ -274,9 +306,26 @@ pub(super) fn normalise(components: &mut [Component]) {
 mod tests {
     use proptest::prelude::*;
 
-    use super::logarithm_at_least;
+    use super::{Likeness, logarithm_at_least};
+    use crate::model::VariableKind;
 
     proptest! {
+        #[test]
+        fn a_size_is_that_of_the_root(n in 3_usize..6, numbers in prop::collection::vec(-2.0_f64..2.0, 25), scale in -60..60) {
+            let scale = 10.0_f64.powi(scale);
+            // Lower triangular, with a diagonal that is surely positive.
+            let root = |i: usize, j: usize| match i.cmp(&j) {
+                std::cmp::Ordering::Less => 0.0,
+                std::cmp::Ordering::Equal => scale * (0.1 + numbers[i * n + i].abs()),
+                std::cmp::Ordering::Greater => scale * numbers[i * n + j],
+            };
+            let entry = |k: usize| (0..n).map(|j| root(k / n, j) * root(k % n, j)).sum();
+            let covariance: Vec<f64> = (0..n * n).map(entry).collect();
+            let likeness = Likeness::new(vec![0.0; n], &vec![VariableKind::Real; n]);
+            let expected: f64 = (0..n).map(|i| 2.0 * root(i, i).ln()).sum();
+            prop_assert!((likeness.size(&covariance) - expected).abs() < 1e-8);
+        }
+
         #[test]
         fn the_chord_lies_below_the_logarithm(exponent in -600.0_f64..600.0) {
             let x = exponent.exp();
