@@ -53,8 +53,8 @@ fn heading(folder: &str) -> String {
          Built-in problems with other noises, rewards and places, which nothing was tried on before it was measured: what is changed is in [data/variants.toml](data/variants.toml). *Planned* is what the first planner promises, *earned* the discounted return of its tree where the model holds, mean ± \
          standard error over {EPISODES} episodes; the rule of thumb of the model file, changed like the rest of it, acts on the same belief in the same episodes. Where a promise misses what is earned, what the output says of it stands behind it. Version {}, seed {SEED}; made by\n\n\
          ```sh\ncargo run --release -p pilotage --example benchmarks -- --variants {folder} --out docs/variants.md\n```\n\n\
-         | of | what differs | nodes at most | nodes | planned | earned | the rule | more than the rule | CPU s |\n\
-         |---|---|--:|--:|--:|--:|--:|--:|--:|\n",
+         | of | what differs | nodes at most | nodes | planned | earned | the rule | more than the rule |\n\
+         |---|---|--:|--:|--:|--:|--:|--:|\n",
         env!("CARGO_PKG_VERSION")
     )
 }
@@ -71,7 +71,7 @@ fn line(variant: &Variant, folder: &str) -> Page {
     };
     let row = task.measure_apart()?;
     Ok(format!(
-        "| `{}` | {} | {} | {} | {} | {} | {} | {} | {} |\n",
+        "| `{}` | {} | {} | {} | {} | {} | {} | {} |\n",
         variant.of,
         variant.differs,
         variant.nodes,
@@ -83,7 +83,6 @@ fn line(variant: &Variant, folder: &str) -> Page {
         estimate(row.earned, DIGITS),
         or_none(row.rule, |rule| estimate(rule.0, DIGITS)),
         or_none(row.rule, |rule| estimate(rule.1, DIGITS)),
-        or_none(row.seconds, |seconds| format!("{seconds:.0}")),
     ))
 }
 
