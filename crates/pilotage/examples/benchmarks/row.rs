@@ -95,12 +95,16 @@ impl Task {
 
     /// Solves the problem, and runs what is found. No return may be lost by fewer nodes.
     pub fn measure(&self) -> Result<Row, Box<dyn Error>> {
-        let scenario = scenario::find(&self.problem)?;
+        let mut scenario = scenario::find(&self.problem)?;
         let registry = Registry::builtin();
         let entry = match &self.solver {
             Some(name) => registry.find(name)?,
             None => registry.first_for(&scenario.model)?,
         };
+        if entry.learns() {
+            // What the rule of thumb earns is measured beside planners.
+            scenario.rule = None;
+        }
         let solver = entry.solver(&self.settings)?;
         let form = match self.tree {
             true => Form::Tree,

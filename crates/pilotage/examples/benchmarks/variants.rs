@@ -41,8 +41,17 @@ pub fn page(folder: &str, asked: &dyn Fn(&str) -> bool) -> Page {
     create_dir_all(folder)?;
     let data: Data = toml::from_str(DATA)?;
     let mut page = heading(folder);
+    let mut remarks = String::new();
     for variant in data.variant.iter().filter(|variant| asked(&variant.of)) {
-        page += &line(variant, folder)?;
+        let row = measured(variant, folder)?;
+        page += &line(variant, &row);
+        if let Some(remark) = remark(&row) {
+            remarks += &format!("- `{}`, {}: {remark}.\n", variant.of, variant.name);
+        }
+    }
+    if !remarks.is_empty() {
+        page +=
+            &format!("\n## What the output says of promises that miss what is earned\n\n{remarks}");
     }
     Ok(page)
 }
@@ -51,15 +60,15 @@ fn heading(folder: &str) -> String {
     format!(
         "# Variants\n\n\
          Built-in problems with other noises, rewards and places, which nothing was tried on before it was measured: what is changed is in [data/variants.toml](data/variants.toml). *Planned* is what the first planner promises, *earned* the discounted return of its tree where the model holds, mean ± \
-         standard error over {EPISODES} episodes; the rule of thumb of the model file, changed like the rest of it, acts on the same belief in the same episodes. Where a promise misses what is earned, what the output says of it stands behind it. Version {}, seed {SEED}; made by\n\n\
+         standard error over {EPISODES} episodes; the rule of thumb of the model file, changed like the rest of it, acts on the same belief in the same episodes. Version {}, seed {SEED}; made by\n\n\
          ```sh\ncargo run --release -p pilotage --example benchmarks -- --variants {folder} --out docs/variants.md\n```\n\n\
-         | of | what differs | nodes at most | nodes | planned | earned | the rule | more than the rule |\n\
-         |---|---|--:|--:|--:|--:|--:|--:|\n",
+         | of | variant | what differs | nodes at most | nodes | planned | earned | the rule | more than the rule |\n\
+         |---|---|---|--:|--:|--:|--:|--:|--:|\n",
         env!("CARGO_PKG_VERSION")
     )
 }
 
-fn line(variant: &Variant, folder: &str) -> Page {
+fn measured(variant: &Variant, folder: &str) -> Result<Row, Box<dyn Error>> {
     let problem = format!("{folder}/{}-{}.toml", variant.of, variant.name);
     write(&problem, text(variant)?)?;
     let task = Task {
@@ -69,28 +78,28 @@ fn line(variant: &Variant, folder: &str) -> Page {
         episodes: EPISODES,
         ..Task::default()
     };
-    let row = task.measure_apart()?;
-    Ok(format!(
-        "| `{}` | {} | {} | {} | {} | {} | {} | {} |\n",
+    Ok(task.measure_apart()?)
+}
+
+fn line(variant: &Variant, row: &Row) -> String {
+    format!(
+        "| `{}` | {} | {} | {} | {} | {} | {} | {} | {} |\n",
         variant.of,
+        variant.name,
         variant.differs,
         variant.nodes,
         or_none(row.nodes, |nodes| nodes.to_string()),
-        or_none(row.planned, |planned| format!(
-            "{planned:.DIGITS$}{}",
-            remark(&row)
-        )),
+        or_none(row.planned, |planned| format!("{planned:.DIGITS$}")),
         estimate(row.earned, DIGITS),
         or_none(row.rule, |rule| estimate(rule.0, DIGITS)),
         or_none(row.rule, |rule| estimate(rule.1, DIGITS)),
-    ))
+    )
 }
 
 /// What the output says of a promise that misses what is earned.
-fn remark(row: &Row) -> String {
+fn remark(row: &Row) -> Option<&String> {
     let mut remarks = row.remarks.iter();
-    let of_promise = remarks.find(|remark| remark.starts_with("planned"));
-    of_promise.map_or_else(String::new, |remark| format!(" ({remark})"))
+    remarks.find(|remark| remark.starts_with("planned"))
 }
 
 /// Its model file.
