@@ -48,10 +48,6 @@ const KEPT: usize = 3;
 /// A round that gains no more than this share of what is earned is a quiet one.
 const GAIN: f64 = 2e-3;
 
-/// The best of many trees earns a little more by chance. Where a step of the belief takes far longer than elsewhere, a round costs too much to
-/// be gone on for that, and one whose gain is no more than so many standard errors is a quiet one too.
-const BY_CHANCE: f64 = 2.0;
-
 /// Beliefs judged in a round of imitation for each episode, and where these are cells about which the policy is asked in full, which takes
 /// far longer; and how many are enough in any case.
 const JUDGED: f64 = 20.0;
@@ -149,11 +145,11 @@ impl Trials {
         self.tried.get(self.best)
     }
 
-    /// Whether the best earns more than these returns, by more than a share of it and by so many standard errors.
-    fn gained(&self, before: &[f64], errors: f64) -> bool {
+    /// Whether the best earns more than these returns, by more than a share of it.
+    fn gained(&self, before: &[f64]) -> bool {
         self.best().is_some_and(|best| {
             let gain = deviation::gain(&best.returns, before);
-            gain.mean > (GAIN * best.earned().abs()).max(errors * gain.stderr)
+            gain.mean > GAIN * best.earned().abs()
         })
     }
 
@@ -253,10 +249,6 @@ impl Search<'_> {
     fn improve(&self, trials: &mut Trials) {
         let most = self.times(DEVIATIONS);
         let budget = self.budget(STEPS);
-        let errors = match self.space.updater().pace() {
-            Pace::Slow => BY_CHANCE,
-            Pace::Fast | Pace::Usual => 0.0,
-        };
         let mut kept: VecDeque<Vec<Judged>> = VecDeque::new();
         let mut quiet = 0;
         for round in 0..IMPROVING {
@@ -272,11 +264,7 @@ impl Search<'_> {
             let mut collected = Collected::new(self.space, &self.bare);
             collected.extend(kept.iter().flatten().cloned());
             self.try_sizes(&collected, trials);
-            quiet = if trials.gained(&earned, errors) {
-                0
-            } else {
-                quiet + 1
-            };
+            quiet = if trials.gained(&earned) { 0 } else { quiet + 1 };
             if quiet == 2 {
                 return;
             }
