@@ -22,7 +22,7 @@ const ERRORS: f64 = 3.0;
 /// Share of a return by which a promise may miss it besides.
 const SHARE: f64 = 0.02;
 
-/// Most epochs of a learner where motion or sensor are not linear, and a step of the belief takes a thousand times as long: enough for
+/// Most epochs of a learner where motion or sensor are not linear, and a step of the belief takes far longer: enough for
 /// exploration to cool, and to be calm for as long as convergence asks.
 const EPOCHS: usize = 30;
 
@@ -227,11 +227,7 @@ fn missed(line: &Line) -> Option<String> {
     let allowed = ERRORS * stderr + SHARE * earned.abs();
     let misses = (planned - earned).abs() > allowed;
     misses.then(|| {
-        let said = row
-            .remarks
-            .iter()
-            .find(|remark| remark.starts_with("planned"));
-        let said = said.map_or("nothing is said of it", String::as_str);
+        let said = row.of_promise().unwrap_or("nothing is said of it");
         format!("`{}`: {said}.", line.name)
     })
 }

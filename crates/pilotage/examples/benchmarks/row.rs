@@ -152,6 +152,13 @@ impl Task {
 pub const HEAD: &str = "| nodes at most | nodes | planner | planned | earned | rule of thumb | more than the rule | CPU seconds | MiB |\n|--:|--:|---|--:|--:|--:|--:|--:|--:|\n";
 
 impl Row {
+    /// What the output says of a promise that misses what is earned.
+    pub fn of_promise(&self) -> Option<&str> {
+        let mut remarks = self.remarks.iter();
+        let of_promise = remarks.find(|remark| remark.starts_with("planned"));
+        of_promise.map(String::as_str)
+    }
+
     /// Itself in a table, with so many digits behind the point of returns.
     pub fn line(&self, digits: usize) -> String {
         let rule =

@@ -1,8 +1,9 @@
 //! docs/variants.md: built-in problems with other noises, rewards and places, so that nothing is tuned to one.
 
 use std::error::Error;
-use std::fs::{create_dir_all, read_to_string, write};
+use std::fs::{create_dir_all, write};
 
+use pilotage::scenario;
 use serde::Deserialize;
 
 use crate::Page;
@@ -11,9 +12,6 @@ use crate::row::{Row, SEED, Task, estimate, or_none};
 
 /// What differs from which problem.
 const DATA: &str = include_str!("../../../../docs/data/variants.toml");
-
-/// Where model files of built-in problems are.
-const MODELS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models");
 
 const DIGITS: usize = 3;
 
@@ -45,7 +43,7 @@ pub fn page(folder: &str, asked: &dyn Fn(&str) -> bool) -> Page {
     for variant in data.variant.iter().filter(|variant| asked(&variant.of)) {
         let row = measured(variant, folder)?;
         page += &line(variant, &row);
-        if let Some(remark) = remark(&row) {
+        if let Some(remark) = row.of_promise() {
             remarks += &format!("- `{}`, {}: {remark}.\n", variant.of, variant.name);
         }
     }
@@ -96,31 +94,20 @@ fn line(variant: &Variant, row: &Row) -> String {
     )
 }
 
-/// What the output says of a promise that misses what is earned.
-fn remark(row: &Row) -> Option<&String> {
-    let mut remarks = row.remarks.iter();
-    remarks.find(|remark| remark.starts_with("planned"))
-}
-
 /// Its model file.
 fn text(variant: &Variant) -> Result<String, Box<dyn Error>> {
     let Variant { of, name, .. } = variant;
-    let places = [
-        format!("{MODELS}/{of}.toml"),
-        format!("{MODELS}/gallery/{of}.toml"),
-    ];
-    let path = places
-        .iter()
-        .find(|path| std::path::Path::new(path).is_file());
-    let path = path.ok_or_else(|| format!("{of}-{name}: there is no model file of {of}"))?;
-    let mut text = read_to_string(path)?;
+    let text = scenario::builtin(of);
+    let mut text = text
+        .ok_or_else(|| format!("{of}-{name}: there is no built-in problem {of}"))?
+        .to_owned();
     let named = (
         format!("name = \"{of}\""),
         format!("name = \"{of}-{name}\""),
     );
     for (from, to) in [&named].into_iter().chain(&variant.change) {
         if !text.contains(from.as_str()) {
-            return Err(format!("{of}-{name}: {from} is not in {path}").into());
+            return Err(format!("{of}-{name}: {from} is not in the model file").into());
         }
         text = text.replace(from.as_str(), to);
     }

@@ -158,7 +158,7 @@ impl Likeness {
                 let determinant: f64 = pivots.iter().product();
                 match SAFE.contains(&determinant) {
                     true => of(determinant),
-                    false => Some(cost(pivots.into_iter().map(f64::ln).sum())),
+                    false => Some(cost(sum_of_logarithms(&pivots))),
                 }
             }
         };
@@ -181,7 +181,7 @@ impl Likeness {
                 let determinant: f64 = pivots.iter().product();
                 match SAFE.contains(&determinant) {
                     true => determinant.ln(),
-                    false => pivots.into_iter().map(f64::ln).sum(),
+                    false => sum_of_logarithms(&pivots),
                 }
             }
         }
@@ -283,6 +283,11 @@ impl Pairs<'_> {
             }
         }
     }
+}
+
+/// Logarithm of a product that is too large or too small for a number.
+fn sum_of_logarithms(factors: &[f64]) -> f64 {
+    factors.iter().map(|factor| factor.ln()).sum()
 }
 
 /// A number that the natural logarithm of a positive one exceeds by at most 0.06: between powers of two the logarithm lies above its chord.
