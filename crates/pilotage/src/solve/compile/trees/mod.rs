@@ -6,7 +6,8 @@
 //!    A. Solar-Lezama, 2018).
 //! 2. **Improve.** The policy sees more of a belief than a tree can ask, so what it expects is not what the tree will earn. The tree is run again,
 //!    and from the beliefs it meets each action is tried once before the tree goes on ([`deviation`]). The next tree is grown on what that
-//!    earned, summed over the last rounds (as Y. Abbasi-Yadkori and others do over all, "POLITEX", 2019), as long as that helps.
+//!    earned, summed over the last rounds (as Y. Abbasi-Yadkori and others do over all, "POLITEX", 2019), as long as that helps. Where beliefs
+//!    are slow too few actions can be tried for that, and the time is spent on more to imitate.
 //! 3. **Choose.** Trees of many sizes are run in the same episodes; the best go on to ever more of them, half of them at a time (Z. Karnin,
 //!    T. Koren and O. Somekh, 2013), and the smallest is taken that earns hardly less than the one that is left.
 
@@ -40,6 +41,9 @@ pub(super) struct Size {
 
 /// Rounds in which the policy is imitated.
 const IMITATING: usize = 3;
+
+/// So many times more episodes are run in them where nothing is improved afterwards.
+const ALONE: usize = 3;
 
 /// Most rounds in which the tree is improved on what it earns, and how many of the last the next tree is grown on.
 const IMPROVING: usize = 12;
@@ -87,11 +91,16 @@ pub(super) fn grow(
     (episodes, seed): (usize, u64),
 ) {
     automaton.matching = Matching::Tree;
+    let pace = space.updater().pace();
+    let start = automaton.updater.start();
+    let knows_values =
+        policy.values_in_full(&start).is_some() || policy.action_value(start.belief(), 0).is_some();
     let search = Search {
         policy,
         space,
         size,
-        episodes: match space.updater().pace() {
+        improves: knows_values && pace != Pace::Slow,
+        episodes: match pace {
             Pace::Fast => FASTER * episodes,
             Pace::Usual => episodes,
             Pace::Slow => episodes.div_ceil(SLOWER),
@@ -101,8 +110,7 @@ pub(super) fn grow(
     };
     let mut trials = Trials::default();
     search.imitate(&mut trials);
-    // Who says only what to do, and not what that is worth, is to be imitated.
-    if search.judge_knows_values() {
+    if search.improves {
         search.improve(&mut trials);
     }
     search.compare(&mut trials);
@@ -115,6 +123,9 @@ struct Search<'a> {
     policy: &'a dyn Policy,
     space: &'a dyn BeliefSpace,
     size: Size,
+    /// Not where the policy says only what to do, and not what that is worth: it is to be imitated. And not where beliefs are slow: so few
+    /// actions could be tried that what they earn would say nothing.
+    improves: bool,
     episodes: usize,
     seed: u64,
     /// The automaton, which has no nodes yet.
@@ -205,25 +216,25 @@ impl Search<'_> {
         }
     }
 
-    fn judge_knows_values(&self) -> bool {
-        let start = self.bare.updater.start();
-        let read = || self.policy.action_value(start.belief(), 0).is_some();
-        self.policy.values_in_full(&start).is_some() || read()
-    }
-
-    /// Trees grown on what the policy expects at the beliefs that they meet.
+    /// Trees grown on what the policy expects at the beliefs that they meet. Where that is all there is, more is made of it: more beliefs are
+    /// looked at, and the trees of every round are tried.
     fn imitate(&self, trials: &mut Trials) {
         let length = self.space.model().episode.length;
         let start = self.bare.updater.start();
         let in_full = start.cells().is_some() && self.policy.values_in_full(&start).is_some();
         let each = if in_full { IN_FULL } else { JUDGED };
-        let most = self.times(each).min(ENOUGH);
+        let episodes = if self.improves {
+            self.episodes
+        } else {
+            ALONE * self.episodes
+        };
+        let most = ((each * episodes as f64).ceil() as usize).min(ENOUGH);
         let mut collected = Collected::new(self.space, &self.bare);
         let mut tree: Option<Automaton> = None;
         for round in 0..IMITATING {
             let runner = tree.as_ref().map(AutomatonRunner::new);
             let imitator = runner.as_ref().map_or(self.policy, |runner| runner);
-            let runs = (self.episodes, length);
+            let runs = (episodes, length);
             let seed = self.seed.wrapping_add(round as u64);
             collected.extend(rollout::judged(
                 self.space,
@@ -235,8 +246,10 @@ impl Search<'_> {
             let all = collected.all();
             let mut growths = Growth::straight_and_slanted(&collected, &all);
             tree = Some(self.of_size((&collected, &all), &mut growths, self.imitated()));
+            if !self.improves || round + 1 == IMITATING {
+                self.try_sizes(&collected, trials);
+            }
         }
-        self.try_sizes(&collected, trials);
     }
 
     /// Nodes of a tree that collects beliefs for the next.
