@@ -8,7 +8,7 @@ use crate::axes::{self, Grid};
 use crate::palette::Paint;
 use crate::plot::{Scale, figure};
 use crate::sheet::{MARGIN, Sign, TINT, diamond};
-use crate::svg::{self, Anchor, Element, label, number};
+use crate::svg::{self, Anchor, Element, label, number, text_width};
 use pilotage::belief::{Belief, Codebook, StratumId};
 use pilotage::model::{ModeId, Region};
 use pilotage::policy::{Automaton, Matching, Node, Place};
@@ -19,6 +19,8 @@ const SIDE: f64 = 300.0;
 const LONE_SIDE: f64 = 420.0;
 const GAP: f64 = 28.0;
 const HEADING: f64 = 44.0;
+/// From the name of what goes up to the panel.
+const NAME: f64 = 8.0;
 const MOST_LEVELS: usize = 4;
 const MOST_PANELS: usize = 9;
 /// Beliefs asked along the longer side.
@@ -32,7 +34,8 @@ pub fn draw(map: &Map<'_>) -> String {
     } else {
         panels.len().min(3)
     };
-    let left = axes::left_of(plane.extent.1);
+    let name = &map.space.model().state[plane.up].name;
+    let left = axes::left_of(plane.extent.1).max((text_width(name, axes::TEXT) + NAME).ceil());
     let (plot_width, plot_height) = plane.size();
     let panel_width = left + plot_width;
     let width = columns as f64 * panel_width + (columns - 1) as f64 * GAP;
@@ -271,7 +274,7 @@ impl Panel<'_> {
         let name = &states[self.plane.up].name;
         elements.push(
             label(
-                (self.x.paper.0 - 8.0, self.y.paper.1 - 10.0),
+                (self.x.paper.0 - NAME, self.y.paper.1 - 10.0),
                 axes::TEXT,
                 Anchor::End,
                 name,
