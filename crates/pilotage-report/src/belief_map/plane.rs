@@ -34,8 +34,8 @@ pub fn draw(map: &Map<'_>) -> String {
     } else {
         panels.len().min(3)
     };
-    let name = &map.space.model().state[plane.up].name;
-    let left = axes::left_of(plane.extent.1).max((text_width(name, axes::TEXT) + NAME).ceil());
+    let name = text_width(plane.name(plane.up), axes::TEXT) + NAME;
+    let left = axes::left_of(plane.extent.1).max(name.ceil());
     let (plot_width, plot_height) = plane.size();
     let panel_width = left + plot_width;
     let width = columns as f64 * panel_width + (columns - 1) as f64 * GAP;
@@ -122,6 +122,11 @@ impl<'a> Plane<'a> {
         }
     }
 
+    /// Name of a variable.
+    fn name(&self, variable: usize) -> &str {
+        &self.map.space.model().state[variable].name
+    }
+
     /// Size of a panel, true to scale unless that makes it thin.
     fn size(&self) -> (f64, f64) {
         let width = |(low, high): (f64, f64)| high - low;
@@ -139,10 +144,10 @@ impl<'a> Plane<'a> {
     }
 
     fn caption(&self) -> String {
-        let states = &self.map.space.model().state;
-        let (across, up) = (&states[self.across].name, &states[self.up].name);
+        let n = self.map.space.model().state_dim();
+        let (across, up) = (self.name(self.across), self.name(self.up));
         let total = self.map.space.strata();
-        if states.len() == 2 {
+        if n == 2 {
             let mut levels: Vec<StratumId> = self.panels.iter().map(|panel| panel.1).collect();
             levels.sort_unstable();
             levels.dedup();
@@ -156,10 +161,9 @@ impl<'a> Plane<'a> {
             return format!("Mean of {across} across, of {up} up; {of} {plural}.");
         }
         let start = &self.map.space.start().mean;
-        let others =
-            (0..states.len()).filter(|&variable| variable != self.across && variable != self.up);
+        let others = (0..n).filter(|&variable| variable != self.across && variable != self.up);
         let fixed: Vec<String> = others
-            .map(|variable| format!("{} = {}", states[variable].name, figure(start[variable])))
+            .map(|variable| format!("{} = {}", self.name(variable), figure(start[variable])))
             .collect();
         format!(
             "A slice at the steady level: mean of {across} across, of {up} up, the two least certain for the width of their bounds; {}, as at the start.",
@@ -262,22 +266,20 @@ struct Panel<'a> {
 
 impl Panel<'_> {
     fn draw(&self) -> Vec<Element> {
-        let states = &self.plane.map.space.model().state;
         let mut elements = axes::horizontal(
             &self.x,
             (self.y.paper.1, self.y.paper.0),
-            &states[self.plane.across].name,
+            self.plane.name(self.plane.across),
             Grid::Strokes,
         );
         elements.extend(axes::vertical(&self.x, &self.y, Grid::Strokes));
         elements.push(self.heading());
-        let name = &states[self.plane.up].name;
         elements.push(
             label(
                 (self.x.paper.0 - NAME, self.y.paper.1 - 10.0),
                 axes::TEXT,
                 Anchor::End,
-                name,
+                self.plane.name(self.plane.up),
             )
             .fill(Paint::Ink),
         );

@@ -223,18 +223,14 @@ impl Search<'_> {
         let start = self.bare.updater.start();
         let in_full = start.cells().is_some() && self.policy.values_in_full(&start).is_some();
         let each = if in_full { IN_FULL } else { JUDGED };
-        let episodes = if self.improves {
-            self.episodes
-        } else {
-            ALONE * self.episodes
-        };
-        let most = ((each * episodes as f64).ceil() as usize).min(ENOUGH);
+        let more = if self.improves { 1 } else { ALONE };
+        let most = self.times(more as f64 * each).min(ENOUGH);
+        let runs = (more * self.episodes, length);
         let mut collected = Collected::new(self.space, &self.bare);
         let mut tree: Option<Automaton> = None;
         for round in 0..IMITATING {
             let runner = tree.as_ref().map(AutomatonRunner::new);
             let imitator = runner.as_ref().map_or(self.policy, |runner| runner);
-            let runs = (episodes, length);
             let seed = self.seed.wrapping_add(round as u64);
             collected.extend(rollout::judged(
                 self.space,
@@ -243,11 +239,14 @@ impl Search<'_> {
                 most,
                 seed,
             ));
-            let all = collected.all();
-            let mut growths = Growth::straight_and_slanted(&collected, &all);
-            tree = Some(self.of_size((&collected, &all), &mut growths, self.imitated()));
-            if !self.improves || round + 1 == IMITATING {
+            let is_last = round + 1 == IMITATING;
+            if is_last || !self.improves {
                 self.try_sizes(&collected, trials);
+            }
+            if !is_last {
+                let all = collected.all();
+                let mut growths = Growth::straight_and_slanted(&collected, &all);
+                tree = Some(self.of_size((&collected, &all), &mut growths, self.imitated()));
             }
         }
     }
